@@ -1,0 +1,2 @@
+//! The horma command.
+pub fn main() -> std::process::ExitCode { std::process::ExitCode::SUCCESS }

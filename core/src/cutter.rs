@@ -1,0 +1,191 @@
+//! The cutters: wheels whose axis is parallel to the spindle.
+//!
+//! A wheel is the body of revolution of a concave profile `m(d)`, the radius at axial distance `d`
+//! from its centre; it is convex, which carries the search and the contact with a facet. Eq. (4) of
+//! the 2001 paper is the torus. This module knows shapes only; heights are in `contact`.
+
+use crate::error::{Error, Result, bounded};
+
+/// A wheel. Lengths in mm; construct with the functions, which check the dimensions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Cutter {
+    /// `m(d) = R + √(r² − d²)`; a ball is a torus with `R = 0`.
+    Torus {
+        /// R: from the axis to the tube's centre.
+        major_radius: f64,
+        /// r: radius of the tube, and half the width.
+        minor_radius: f64,
+    },
+    /// `m(d) = R` over the width.
+    Cylinder {
+        /// Radius of the wheel.
+        radius: f64,
+        /// Full width.
+        width: f64,
+    },
+    /// `m(d) = R + d·tan φ` over the width.
+    Cone {
+        /// Radius in the middle of the width.
+        radius: f64,
+        /// Full width.
+        width: f64,
+        /// φ, degrees; positive if the radius grows along +X.
+        half_angle: f64,
+        /// tan φ.
+        slope: f64,
+    },
+}
+
+/// Largest dimension of a cutter, mm.
+const MAX_DIMENSION: f64 = 1.0e4;
+
+fn dimension(quantity: &'static str, value: f64) -> Result<()> {
+    let ok = value > 0.0 && value <= MAX_DIMENSION;
+    bounded(quantity, value, ok, "greater than 0 and at most 10000 mm")
+}
+
+impl Cutter {
+    /// A torus of major radius R ≥ 0 and minor radius r > 0.
+    ///
+    /// # Errors
+    /// [`Error::OutOfBounds`] if a radius is negative, not finite or beyond 10 m.
+    pub fn torus(major_radius: f64, minor_radius: f64) -> Result<Self> {
+        let ok = (0.0..=MAX_DIMENSION).contains(&major_radius);
+        bounded(
+            "major_radius",
+            major_radius,
+            ok,
+            "at least 0 and at most 10000 mm",
+        )?;
+        dimension("minor_radius", minor_radius)?;
+        Ok(Self::Torus {
+            major_radius,
+            minor_radius,
+        })
+    }
+
+    /// A ball.
+    ///
+    /// # Errors
+    /// [`Error::OutOfBounds`] if the radius is not positive and finite.
+    pub fn ball(radius: f64) -> Result<Self> {
+        dimension("radius", radius)?;
+        Self::torus(0.0, radius)
+    }
+
+    /// A cylinder.
+    ///
+    /// # Errors
+    /// [`Error::OutOfBounds`] if a dimension is not positive and finite.
+    pub fn cylinder(radius: f64, width: f64) -> Result<Self> {
+        dimension("radius", radius)?;
+        dimension("width", width)?;
+        Ok(Self::Cylinder { radius, width })
+    }
+
+    /// A cone, `radius` in the middle of its width, `half_angle` in degrees between side and axis.
+    ///
+    /// # Errors
+    /// [`Error::OutOfBounds`] for a dimension, [`Error::ConeTooSteep`] if the small end would have
+    /// a negative radius.
+    pub fn cone(radius: f64, width: f64, half_angle: f64) -> Result<Self> {
+        dimension("radius", radius)?;
+        dimension("width", width)?;
+        let ok = half_angle.abs() < 90.0;
+        bounded(
+            "half_angle",
+            half_angle,
+            ok,
+            "between -90 and 90 degrees, both excluded",
+        )?;
+        let slope = libm::tan(half_angle.to_radians());
+        if slope.abs() * width / 2.0 > radius {
+            return Err(Error::ConeTooSteep {
+                half_angle,
+                radius,
+                width,
+                limit: libm::atan(radius / (width / 2.0)).to_degrees(),
+            });
+        }
+        Ok(Self::Cone {
+            radius,
+            width,
+            half_angle,
+            slope,
+        })
+    }
+
+    /// w: half the width along the spindle, mm.
+    pub fn half_width(&self) -> f64 {
+        match *self {
+            Self::Torus { minor_radius, .. } => minor_radius,
+            Self::Cylinder { width, .. } | Self::Cone { width, .. } => width / 2.0,
+        }
+    }
+
+    /// Largest radius of the profile, mm.
+    pub fn max_radius(&self) -> f64 {
+        match *self {
+            Self::Torus {
+                major_radius,
+                minor_radius,
+            } => major_radius + minor_radius,
+            Self::Cylinder { radius, .. } => radius,
+            Self::Cone {
+                radius,
+                width,
+                slope,
+                ..
+            } => radius + slope.abs() * width / 2.0,
+        }
+    }
+
+    /// `m(d)`, the radius at axial distance `d` from the centre, or `None` beyond the width.
+    #[inline(always)]
+    pub fn profile(&self, d: f64) -> Option<f64> {
+        match *self {
+            Self::Torus {
+                major_radius,
+                minor_radius,
+            } => {
+                let q = minor_radius * minor_radius - d * d;
+                (q >= 0.0).then(|| major_radius + q.sqrt())
+            }
+            Self::Cylinder { radius, width } => (d.abs() <= width / 2.0).then_some(radius),
+            Self::Cone {
+                radius,
+                width,
+                slope,
+                ..
+            } => (d.abs() <= width / 2.0).then(|| radius + d * slope),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dimensions_are_checked() {
+        assert!(Cutter::torus(40.0, 8.0).is_ok());
+        assert!(Cutter::torus(-1.0, 8.0).is_err());
+        assert!(Cutter::torus(40.0, 0.0).is_err());
+        assert!(Cutter::ball(f64::NAN).is_err());
+        assert!(Cutter::cylinder(10.0, f64::INFINITY).is_err());
+        assert!(matches!(
+            Cutter::cone(10.0, 30.0, 45.0),
+            Err(Error::ConeTooSteep { .. })
+        ));
+    }
+
+    #[test]
+    fn profiles_are_the_papers() {
+        let torus = Cutter::torus(40.0, 8.0).expect("valid");
+        assert_eq!(torus.profile(0.0), Some(48.0));
+        assert_eq!(torus.profile(8.0), Some(40.0));
+        assert_eq!(torus.profile(8.1), None);
+        let cone = Cutter::cone(10.0, 20.0, 45.0).expect("valid");
+        assert!((cone.profile(-10.0).expect("inside")).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,176 @@
+//! What the mathematics refuses, and why.
+
+/// Everything that can be wrong with a part, a cutter or a motion.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// A number outside its bounds. `quantity` is the name it has in a job file.
+    #[error("{quantity} is {value}, but must be {bound}")]
+    OutOfBounds {
+        /// Name in the job file.
+        quantity: &'static str,
+        /// The number that was given.
+        value: f64,
+        /// What would have been accepted.
+        bound: &'static str,
+    },
+    /// A cone so steep that its small end has a negative radius.
+    #[error(
+        "half_angle is {half_angle}°, but a cone of radius {radius} and width {width} allows at most {limit}°"
+    )]
+    ConeTooSteep {
+        /// Angle between the cone's side and its axis, degrees.
+        half_angle: f64,
+        /// Radius in the middle of the cone's width, mm.
+        radius: f64,
+        /// Full width, mm.
+        width: f64,
+        /// Steepest angle that these dimensions allow, degrees.
+        limit: f64,
+    },
+    /// The travel ends before it begins.
+    #[error("the travel goes from {from} to {to}, but must not end before it begins")]
+    EmptyTravel {
+        /// First travel, mm.
+        from: f64,
+        /// Last travel, mm.
+        to: f64,
+    },
+    /// A path with more positions than an index can count.
+    #[error(
+        "the motion has {positions:.3e} positions, more than the {limit:.1e} that a path can have"
+    )]
+    TooManyPositions {
+        /// Number of positions asked for.
+        positions: f64,
+        /// Most positions that a path can have.
+        limit: f64,
+    },
+    /// A grid with more points than a row or a part can index.
+    #[error("{name}: a grid of {rows} rows × {columns} columns is more than the {limit} that a surface can have in either direction")]
+    GridTooLarge {
+        /// Name of the surface.
+        name: String,
+        /// Rows asked for.
+        rows: usize,
+        /// Columns asked for.
+        columns: usize,
+        /// Most rows, and most columns.
+        limit: usize,
+    },
+    /// Nothing to machine.
+    #[error("the part is empty: it has no surface and no triangle")]
+    EmptyPart,
+    /// A coordinate, weight or knot that is not a number.
+    #[error("{name}: {what} {index} is {value}, which is not a finite number")]
+    NotFinite {
+        /// Name of the body.
+        name: String,
+        /// Kind of number: `vertex`, `pole`, `weight` or `knot`.
+        what: &'static str,
+        /// Which one, from 0.
+        index: usize,
+        /// The number as found.
+        value: f64,
+    },
+    /// A coordinate so far out that doubles no longer resolve a micrometre well.
+    #[error("{name}: {what} {index} has a coordinate of {value} mm, beyond the {limit} mm that a part may extend")]
+    TooFar {
+        /// Name of the body.
+        name: String,
+        /// Kind of number: `vertex` or `pole`.
+        what: &'static str,
+        /// Which one, from 0.
+        index: usize,
+        /// The coordinate as found, mm.
+        value: f64,
+        /// Greatest magnitude, mm.
+        limit: f64,
+    },
+    /// A B-spline surface whose numbers contradict each other.
+    #[error("{name}: {reason}")]
+    BadSurface {
+        /// Name of the surface.
+        name: String,
+        /// What contradicts what.
+        reason: String,
+    },
+    /// A triangle that names a vertex that does not exist.
+    #[error("{name}: triangle {triangle} names vertex {vertex}, but there are only {vertices}")]
+    NoSuchVertex {
+        /// Name of the mesh.
+        name: String,
+        /// The triangle, from 0.
+        triangle: usize,
+        /// The vertex it names, from 0.
+        vertex: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A row whose facets name points that it does not have.
+    #[error("row {row}: facet {facet} names a point beyond the row's {points}")]
+    BadRow {
+        /// Number of the row in the part.
+        row: u32,
+        /// The facet, from 0.
+        facet: usize,
+        /// Points in the row.
+        points: usize,
+    },
+    /// A spindle axis without a direction.
+    #[error("the axis has the direction [{}, {}, {}], which has no length", direction[0], direction[1], direction[2])]
+    NoDirection {
+        /// The direction that was given.
+        direction: [f64; 3],
+    },
+    /// A grid that cannot be refined to the tolerance.
+    #[error("{name}: a grid of {rows} × {columns} points still deviates by {deviation} mm from the surface, and the tolerance is {tolerance} mm; ask for a coarser tolerance")]
+    ToleranceNotReached {
+        /// Name of the surface.
+        name: String,
+        /// Rows of the finest grid tried.
+        rows: usize,
+        /// Columns of the finest grid tried.
+        columns: usize,
+        /// Deviation still found, mm.
+        deviation: f64,
+        /// Deviation asked for, mm.
+        tolerance: f64,
+    },
+    /// Stitching found positions that nobody delivered.
+    #[error("positions {first} to {last} are missing from the path")]
+    Gap {
+        /// First missing position.
+        first: u64,
+        /// Last missing position.
+        last: u64,
+    },
+    /// Stitching found positions that were delivered twice.
+    #[error("positions {first} to {last} were delivered twice")]
+    Duplicate {
+        /// First position delivered again.
+        first: u64,
+        /// Last position delivered again.
+        last: u64,
+    },
+}
+
+/// The result of an operation of the core.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// `Ok` if `ok` holds, else the error that names the quantity, its value and its bound.
+pub(crate) fn bounded(
+    quantity: &'static str,
+    value: f64,
+    ok: bool,
+    bound: &'static str,
+) -> Result<()> {
+    if ok {
+        Ok(())
+    } else {
+        Err(Error::OutOfBounds {
+            quantity,
+            value,
+            bound,
+        })
+    }
+}

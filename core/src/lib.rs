@@ -1,0 +1,33 @@
+//! The mathematics of virtual digitizing: from a part to the heights of a tool path.
+//!
+//! Turn the part to face the cutter, advance the cutter along the attack axis, and stop where it
+//! first touches: that is the tool centre for this position. The modules follow the pipeline.
+//! This crate refuses I/O, clocks, async and wire types: it is values in and values out, and the
+//! same values in give the same bits out on any machine and with any number of threads.
+
+mod error;
+mod tolerance;
+mod vector;
+
+mod surface;
+
+mod part;
+
+mod placement;
+
+mod cutter;
+mod job;
+mod motion;
+
+mod path;
+
+pub use cutter::Cutter;
+pub use error::{Error, Result};
+pub use job::{Contact, Discretization, Job, Method};
+pub use motion::{Motion, MotionKind, Trajectory};
+pub use part::{Body, Mesh, Part, Shape};
+pub use path::{SubTrajectory, ToolPath, Touch, stitch};
+pub use placement::{Axis, place};
+pub use surface::{Direction, MAX_DEGREE, Surface};
+pub use tolerance::MAX_COORDINATE;
+pub use vector::{Interval, Point, cross, dot, length, sub, unit};

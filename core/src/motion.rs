@@ -1,0 +1,241 @@
+//! The motion of cutter and part: where along the spindle, and at which angle, each position is.
+//!
+//! A position follows from its index alone (eq. numbers do not exist in the papers: the spiral is
+//! described in "Definition of the tool motion"). Angles come from the integer index and from the
+//! `libm` crate, so that position i is the same bits on every machine.
+
+use crate::error::{Error, Result, bounded};
+use crate::vector::Interval;
+
+/// How travel and rotation go together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MotionKind {
+    /// Travel grows with the angle: a spiral of constant step.
+    Helix,
+    /// Travel stands still for each revolution and then advances by one step.
+    Rings,
+}
+
+/// The motion that a job asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// Helix or rings.
+    pub kind: MotionKind,
+    /// Travel per revolution, mm.
+    pub step: f64,
+    /// Positions per revolution.
+    pub points_per_revolution: u32,
+    /// First travel, mm; by default the part's lower end less the cutter's half width.
+    pub from: Option<f64>,
+    /// Last travel, mm; by default the part's upper end plus the cutter's half width.
+    pub to: Option<f64>,
+}
+
+/// The positions of a path: `x = from + step·i/ppr`, `angle = 360·i/ppr`, for as long as `x ≤ to`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trajectory {
+    /// Helix or rings.
+    pub kind: MotionKind,
+    /// First travel, mm.
+    pub from: f64,
+    /// Travel per revolution, mm.
+    pub step: f64,
+    /// Positions per revolution.
+    pub points_per_revolution: u32,
+    /// Number of positions.
+    pub positions: u64,
+}
+
+/// Most positions of a path: an index has to be exact in a double.
+const MAX_POSITIONS: f64 = 1.0e15;
+
+impl Motion {
+    /// Checks what can be checked without a part.
+    ///
+    /// # Errors
+    /// [`Error::OutOfBounds`] for a step or a number of points that cannot be,
+    /// [`Error::EmptyTravel`] if the travel ends before it begins.
+    pub fn validate(&self) -> Result<()> {
+        bounded(
+            "step",
+            self.step,
+            self.step > 0.0 && self.step.is_finite(),
+            "greater than 0 mm",
+        )?;
+        bounded(
+            "points_per_revolution",
+            f64::from(self.points_per_revolution),
+            self.points_per_revolution > 0,
+            "at least 1",
+        )?;
+        for (name, value) in [("from", self.from), ("to", self.to)] {
+            if let Some(value) = value {
+                bounded(name, value, value.is_finite(), "a finite number of mm")?;
+            }
+        }
+        match (self.from, self.to) {
+            (Some(from), Some(to)) if from > to => Err(Error::EmptyTravel { from, to }),
+            _ => Ok(()),
+        }
+    }
+
+    /// The positions of this motion over a part that extends over `part` along the spindle, for a
+    /// cutter of the given half width. The default range is the part's, widened by the half width:
+    /// there the cutter's flank just leaves the part's ends, so that they are finished.
+    ///
+    /// # Errors
+    /// Those of [`Motion::validate`], and [`Error::TooManyPositions`].
+    pub fn over(&self, part: Interval, half_width: f64) -> Result<Trajectory> {
+        self.validate()?;
+        let range = part.widened(half_width);
+        let from = self.from.unwrap_or(range.low);
+        let to = self.to.unwrap_or(range.high);
+        if from > to {
+            return Err(Error::EmptyTravel { from, to });
+        }
+        let mut trajectory = Trajectory {
+            kind: self.kind,
+            from,
+            step: self.step,
+            points_per_revolution: self.points_per_revolution,
+            positions: 0,
+        };
+        let ppr = f64::from(self.points_per_revolution);
+        let revolutions = (to - from) / self.step;
+        let guess = match self.kind {
+            MotionKind::Helix => revolutions * ppr,
+            MotionKind::Rings => (revolutions.floor() + 1.0) * ppr,
+        };
+        if guess > MAX_POSITIONS {
+            return Err(Error::TooManyPositions {
+                positions: guess,
+                limit: MAX_POSITIONS,
+            });
+        }
+        // The quotient above is rounded; `x ≤ to` itself decides the last position.
+        let mut count = guess as u64;
+        while count > 0 && trajectory.travel(count - 1) > to {
+            count -= 1;
+        }
+        while trajectory.travel(count) <= to {
+            count += 1;
+        }
+        trajectory.positions = count;
+        Ok(trajectory)
+    }
+}
+
+impl Trajectory {
+    /// Travel of position `index` along the spindle, mm. It never decreases with the index.
+    #[inline]
+    pub fn travel(&self, index: u64) -> f64 {
+        let ppr = u64::from(self.points_per_revolution);
+        let steps = match self.kind {
+            MotionKind::Helix => return self.from + self.step * index as f64 / ppr as f64,
+            MotionKind::Rings => index / ppr,
+        };
+        self.from + self.step * steps as f64
+    }
+
+    /// Angle of position `index`, degrees, counted on from 0 without wrapping.
+    #[inline]
+    pub fn angle(&self, index: u64) -> f64 {
+        360.0 * index as f64 / f64::from(self.points_per_revolution)
+    }
+
+    /// `(cos θ, sin θ)` of each of the angles of one revolution, in order.
+    pub fn directions(&self) -> Vec<(f64, f64)> {
+        let ppr = f64::from(self.points_per_revolution);
+        (0..self.points_per_revolution)
+            .map(|i| {
+                let angle = 2.0 * std::f64::consts::PI * (f64::from(i) / ppr);
+                (libm::cos(angle), libm::sin(angle))
+            })
+            .collect()
+    }
+
+    /// The smallest interval that holds the travel of positions `first .. first + count`.
+    pub fn travel_of(&self, first: u64, count: u64) -> Interval {
+        if count == 0 {
+            return Interval::EMPTY;
+        }
+        Interval {
+            low: self.travel(first),
+            high: self.travel(first + count - 1),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn motion(kind: MotionKind) -> Motion {
+        Motion {
+            kind,
+            step: 2.0,
+            points_per_revolution: 4,
+            from: Some(0.0),
+            to: Some(4.0),
+        }
+    }
+
+    const PART: Interval = Interval {
+        low: 0.0,
+        high: 10.0,
+    };
+
+    #[test]
+    fn a_helix_advances_with_the_angle_and_includes_its_end() {
+        let t = motion(MotionKind::Helix).over(PART, 1.0).expect("valid");
+        assert_eq!(t.positions, 9);
+        assert_eq!((t.travel(8), t.angle(8)), (4.0, 720.0));
+    }
+
+    #[test]
+    fn rings_stand_still_for_a_revolution() {
+        let t = motion(MotionKind::Rings).over(PART, 1.0).expect("valid");
+        assert_eq!(t.positions, 12);
+        assert_eq!(t.travel_of(4, 4), Interval { low: 2.0, high: 2.0 });
+    }
+
+    #[test]
+    fn the_default_range_is_the_parts_widened_by_the_cutter() {
+        let m = Motion {
+            from: None,
+            to: None,
+            ..motion(MotionKind::Helix)
+        };
+        let t = m.over(PART, 1.0).expect("valid");
+        assert_eq!(
+            t.travel_of(0, t.positions),
+            Interval {
+                low: -1.0,
+                high: 11.0
+            }
+        );
+    }
+
+    #[test]
+    fn impossible_motions_are_refused() {
+        let m = motion(MotionKind::Helix);
+        for bad in [
+            Motion { step: 0.0, ..m },
+            Motion {
+                points_per_revolution: 0,
+                ..m
+            },
+            Motion {
+                from: Some(f64::NAN),
+                ..m
+            },
+            Motion {
+                from: Some(9.0),
+                ..m
+            },
+            Motion { step: 1e-300, ..m },
+        ] {
+            assert!(bad.over(PART, 1.0).is_err(), "{bad:?}");
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! Every tolerance of the core, in one place.
+
+/// Greatest magnitude of a part's coordinate, mm. At a kilometre a double still resolves 0.1 nm,
+/// so the slack below covers every rounding error with room to spare.
+pub const MAX_COORDINATE: f64 = 1.0e6;
+
+/// Added to every upper bound that decides whether a part of the surface can be skipped, relative
+/// to the magnitude of the numbers that went into it: rounding must never prune the winner.
+pub const BOUND_SLACK: f64 = 1.0e-12;
+
+/// A line search along a facet's edge stops once its bracket is this fraction of the edge. Near the
+/// maximum the height is flat, so the height's own error is of the order of this number's square.
+pub const EDGE_SEARCH: f64 = 1.0e-9;
+
+/// Surfaces whose opposite boundaries are no further apart than this count as closed, mm.
+pub const SEAM: f64 = 1.0e-6;

@@ -1,0 +1,92 @@
+//! Vectors of the kernel: three doubles, combined by a fixed sequence of + − × ÷ √.
+//!
+//! Anything that decides a height is computed here and not through a general library, so that the
+//! order of the operations, and with it every bit of the result, is written down in one place.
+
+/// A point or a vector, mm.
+pub type Point = [f64; 3];
+
+/// `a − b`.
+#[inline(always)]
+pub fn sub(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// `a + s·b`.
+#[inline(always)]
+pub fn add_scaled(a: Point, s: f64, b: Point) -> Point {
+    [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
+}
+
+/// Scalar product.
+#[inline(always)]
+pub fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Vector product.
+#[inline(always)]
+pub fn cross(a: Point, b: Point) -> Point {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// Euclidean length.
+#[inline(always)]
+pub fn length(a: Point) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// `a` scaled to length 1, or `None` if it has no length.
+pub fn unit(a: Point) -> Option<Point> {
+    let l = length(a);
+    (l > 0.0 && l.is_finite()).then(|| [a[0] / l, a[1] / l, a[2] / l])
+}
+
+/// A closed interval `[low, high]` of the x axis, mm; empty if `low > high`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+impl Interval {
+    /// The interval that holds nothing.
+    pub const EMPTY: Self = Self {
+        low: f64::INFINITY,
+        high: f64::NEG_INFINITY,
+    };
+
+    /// The smallest interval that holds every value.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+        values
+            .into_iter()
+            .fold(Self::EMPTY, |i, x| i.hull(Self { low: x, high: x }))
+    }
+
+    /// The smallest interval that holds both.
+    pub fn hull(self, other: Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+        }
+    }
+
+    /// The interval grown by `by` at both ends.
+    pub fn widened(self, by: f64) -> Self {
+        Self {
+            low: self.low - by,
+            high: self.high + by,
+        }
+    }
+
+    /// Whether the two have a point in common.
+    pub fn meets(self, other: Self) -> bool {
+        self.low <= other.high && other.low <= self.high
+    }
+}

@@ -1,0 +1,17 @@
+//! Files in and out of horma: parts and jobs come in, paths, programs and reports go out.
+//!
+//! This crate owns every file format and nothing else: it computes no path and opens no socket.
+
+mod error;
+
+pub mod job;
+pub mod part;
+
+pub mod sample;
+
+pub mod csv;
+pub mod gcode;
+pub mod preview;
+pub mod report;
+
+pub use error::{Error, Result};

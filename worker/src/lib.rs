@@ -1,0 +1,1 @@
+//! One digitizing worker.
