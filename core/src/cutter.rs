@@ -16,14 +16,7 @@ pub enum Cutter {
         /// r: radius of the tube, and half the width.
         minor_radius: f64,
     },
-    /// `m(d) = R` over the width.
-    Cylinder {
-        /// Radius of the wheel.
-        radius: f64,
-        /// Full width.
-        width: f64,
-    },
-    /// `m(d) = R + d·tan φ` over the width.
+    /// `m(d) = R + d·tan φ` over the width; a cylinder is a cone with `φ = 0`.
     Cone {
         /// Radius in the middle of the width.
         radius: f64,
@@ -79,8 +72,7 @@ impl Cutter {
     /// [`Error::OutOfBounds`] if a dimension is not positive and finite.
     pub fn cylinder(radius: f64, width: f64) -> Result<Self> {
         dimension("radius", radius)?;
-        dimension("width", width)?;
-        Ok(Self::Cylinder { radius, width })
+        Self::cone(radius, width, 0.0)
     }
 
     /// A cone, `radius` in the middle of its width, `half_angle` in degrees between side and axis.
@@ -119,7 +111,7 @@ impl Cutter {
     pub fn half_width(&self) -> f64 {
         match *self {
             Self::Torus { minor_radius, .. } => minor_radius,
-            Self::Cylinder { width, .. } | Self::Cone { width, .. } => width / 2.0,
+            Self::Cone { width, .. } => width / 2.0,
         }
     }
 
@@ -130,7 +122,6 @@ impl Cutter {
                 major_radius,
                 minor_radius,
             } => major_radius + minor_radius,
-            Self::Cylinder { radius, .. } => radius,
             Self::Cone {
                 radius,
                 width,
@@ -151,7 +142,6 @@ impl Cutter {
                 let q = minor_radius * minor_radius - d * d;
                 (q >= 0.0).then(|| major_radius + q.sqrt())
             }
-            Self::Cylinder { radius, width } => (d.abs() <= width / 2.0).then_some(radius),
             Self::Cone {
                 radius,
                 width,

@@ -46,7 +46,9 @@ pub enum Error {
         limit: f64,
     },
     /// A grid with more points than a row or a part can index.
-    #[error("{name}: a grid of {rows} rows × {columns} columns is more than the {limit} that a surface can have in either direction")]
+    #[error(
+        "{name}: a grid of {rows} rows × {columns} columns is more than the {limit} that a surface can have in either direction"
+    )]
     GridTooLarge {
         /// Name of the surface.
         name: String,
@@ -73,7 +75,9 @@ pub enum Error {
         value: f64,
     },
     /// A coordinate so far out that doubles no longer resolve a micrometre well.
-    #[error("{name}: {what} {index} has a coordinate of {value} mm, beyond the {limit} mm that a part may extend")]
+    #[error(
+        "{name}: {what} {index} has a coordinate of {value} mm, beyond the {limit} mm that a part may extend"
+    )]
     TooFar {
         /// Name of the body.
         name: String,
@@ -123,7 +127,9 @@ pub enum Error {
         direction: [f64; 3],
     },
     /// A grid that cannot be refined to the tolerance.
-    #[error("{name}: a grid of {rows} × {columns} points still deviates by {deviation} mm from the surface, and the tolerance is {tolerance} mm; ask for a coarser tolerance")]
+    #[error(
+        "{name}: a grid of {rows} × {columns} points still deviates by {deviation} mm from the surface, and the tolerance is {tolerance} mm; ask for a coarser tolerance"
+    )]
     ToleranceNotReached {
         /// Name of the surface.
         name: String,
@@ -151,6 +157,14 @@ pub enum Error {
         first: u64,
         /// Last position delivered again.
         last: u64,
+    },
+    /// Stitching found a position that the trajectory does not have.
+    #[error("position {position} was delivered, but the path has only {positions}")]
+    BeyondTheEnd {
+        /// The last position delivered.
+        position: u64,
+        /// Number of positions of the trajectory.
+        positions: u64,
     },
 }
 

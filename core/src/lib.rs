@@ -12,22 +12,41 @@ mod vector;
 mod surface;
 
 mod part;
-
 mod placement;
 
 mod cutter;
 mod job;
 mod motion;
 
+mod refine;
+
+mod discretize;
+mod row;
+
+mod extent;
+
+mod contact;
+
+mod bound;
+
+mod tree;
+
+mod digitize;
+
 mod path;
 
 pub use cutter::Cutter;
+pub use digitize::{CHUNK, Digitizer};
+pub use discretize::{BodyModel, Model, discretize};
 pub use error::{Error, Result};
+pub use extent::{Extent, split};
 pub use job::{Contact, Discretization, Job, Method};
 pub use motion::{Motion, MotionKind, Trajectory};
 pub use part::{Body, Mesh, Part, Shape};
 pub use path::{SubTrajectory, ToolPath, Touch, stitch};
 pub use placement::{Axis, place};
+pub use row::{Outline, Row, RowKind, outlines};
 pub use surface::{Direction, MAX_DEGREE, Surface};
 pub use tolerance::MAX_COORDINATE;
+pub use tree::Counters;
 pub use vector::{Interval, Point, cross, dot, length, sub, unit};

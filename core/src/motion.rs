@@ -196,7 +196,13 @@ mod tests {
     fn rings_stand_still_for_a_revolution() {
         let t = motion(MotionKind::Rings).over(PART, 1.0).expect("valid");
         assert_eq!(t.positions, 12);
-        assert_eq!(t.travel_of(4, 4), Interval { low: 2.0, high: 2.0 });
+        assert_eq!(
+            t.travel_of(4, 4),
+            Interval {
+                low: 2.0,
+                high: 2.0
+            }
+        );
     }
 
     #[test]

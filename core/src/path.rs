@@ -35,25 +35,30 @@ pub struct SubTrajectory {
 /// Joins sub-trajectories, in any order, into a path.
 ///
 /// # Errors
-/// [`Error::Gap`] or [`Error::Duplicate`] unless every position comes exactly once.
+/// [`Error::Gap`] or [`Error::Duplicate`] unless every position comes exactly once, and
+/// [`Error::BeyondTheEnd`] if there is one that the trajectory does not have.
 pub fn stitch(trajectory: Trajectory, mut parts: Vec<SubTrajectory>) -> Result<ToolPath> {
-    parts.retain(|p| !p.touches.is_empty());
-    parts.sort_by_key(|p| p.first);
-    let mut touches = Vec::with_capacity(usize::try_from(trajectory.positions).unwrap_or(0));
+    parts.sort_by_key(|p| (p.first, p.touches.len()));
+    let mut touches = Vec::with_capacity(parts.iter().map(|p| p.touches.len()).sum());
     for part in parts {
         let next = touches.len() as u64;
         let end = part.first + part.touches.len() as u64;
+        if end > trajectory.positions {
+            return Err(Error::BeyondTheEnd {
+                position: end - 1,
+                positions: trajectory.positions,
+            });
+        }
         if part.first > next {
             return Err(Error::Gap {
                 first: next,
                 last: part.first - 1,
             });
         }
-        let known = next.max(trajectory.positions.min(end));
-        if part.first < next || end > known {
+        if part.first < next && !part.touches.is_empty() {
             return Err(Error::Duplicate {
-                first: part.first.min(known),
-                last: end.min(next.max(part.first + 1)) - 1,
+                first: part.first,
+                last: next.min(end) - 1,
             });
         }
         touches.extend(part.touches);
@@ -69,4 +74,46 @@ pub fn stitch(trajectory: Trajectory, mut parts: Vec<SubTrajectory>) -> Result<T
         trajectory,
         touches,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::MotionKind;
+
+    fn check(parts: &[(u64, usize)]) -> Result<usize> {
+        let trajectory = Trajectory {
+            kind: MotionKind::Helix,
+            from: 0.0,
+            step: 1.0,
+            points_per_revolution: 4,
+            positions: 10,
+        };
+        let parts = parts.iter().map(|&(first, count)| SubTrajectory {
+            first,
+            touches: vec![None; count],
+        });
+        stitch(trajectory, parts.collect()).map(|p| p.touches.len())
+    }
+
+    #[test]
+    fn order_does_not_matter_and_empty_parts_do_no_harm() {
+        assert_eq!(check(&[(6, 4), (0, 3), (3, 0), (3, 3)]), Ok(10));
+    }
+
+    #[test]
+    fn every_position_must_come_exactly_once() {
+        assert_eq!(
+            check(&[(0, 3), (5, 5)]),
+            Err(Error::Gap { first: 3, last: 4 })
+        );
+        assert_eq!(check(&[(0, 9)]), Err(Error::Gap { first: 9, last: 9 }));
+        let twice = Error::Duplicate { first: 3, last: 4 };
+        assert_eq!(check(&[(0, 5), (3, 7)]), Err(twice));
+        let beyond = Error::BeyondTheEnd {
+            position: 10,
+            positions: 10,
+        };
+        assert_eq!(check(&[(0, 5), (5, 6)]), Err(beyond));
+    }
 }

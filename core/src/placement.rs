@@ -117,7 +117,13 @@ fn principal_axis(part: &Part) -> Result<(Point, Point)> {
     }
     let greatest = (0..3)
         .map(|i| power.column(i).into_owned())
-        .reduce(|a, b| if b.norm_squared() > a.norm_squared() { b } else { a })
+        .reduce(|a, b| {
+            if b.norm_squared() > a.norm_squared() {
+                b
+            } else {
+                a
+            }
+        })
         .unwrap_or_else(Vector3::x);
     let along = greatest.iamax();
     let direction = greatest * greatest[along].signum();
@@ -134,9 +140,7 @@ mod tests {
         Part {
             bodies: vec![Body {
                 name: "quad".to_owned(),
-                shape: Shape::Mesh(
-                    Mesh::new("quad", vertices.to_vec(), triangles).expect("valid"),
-                ),
+                shape: Shape::Mesh(Mesh::new("quad", vertices.to_vec(), triangles).expect("valid")),
             }],
         }
     }
@@ -195,6 +199,9 @@ mod tests {
     fn the_principal_axis_is_the_longest() {
         let placed = vertices(&place(part(&QUAD), Axis::Principal).expect("valid"));
         let xs: Vec<f64> = placed.iter().map(|p| p[0]).collect();
-        assert!((xs[0] + 5.0).abs() < 1e-9 && (xs[1] - 5.0).abs() < 1e-9, "{xs:?}");
+        assert!(
+            (xs[0] + 5.0).abs() < 1e-9 && (xs[1] - 5.0).abs() < 1e-9,
+            "{xs:?}"
+        );
     }
 }

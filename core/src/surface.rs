@@ -176,7 +176,10 @@ impl Surface {
             }
             let valid = |w: f64| w.is_finite() && w > 0.0;
             if let Some(i) = weights.iter().position(|&w| !valid(w)) {
-                return bad(format!("weight {i} is {}, but must be positive", weights[i]));
+                return bad(format!(
+                    "weight {i} is {}, but must be positive",
+                    weights[i]
+                ));
             }
         }
         let weights = weights.filter(|w| w.iter().any(|&x| x != w[0]));
@@ -234,8 +237,7 @@ impl Surface {
         };
         let along_u = travel(&mut self.poles.iter().zip(&self.poles[n..])) / n as f64;
         let rows = self.poles.chunks_exact(n);
-        let along_v =
-            travel(&mut rows.flat_map(|r| r.iter().zip(&r[1..]))) / self.u.count() as f64;
+        let along_v = travel(&mut rows.flat_map(|r| r.iter().zip(&r[1..]))) / self.u.count() as f64;
         if along_u >= along_v {
             self
         } else {

@@ -11,6 +11,3 @@ pub const BOUND_SLACK: f64 = 1.0e-12;
 /// A line search along a facet's edge stops once its bracket is this fraction of the edge. Near the
 /// maximum the height is flat, so the height's own error is of the order of this number's square.
 pub const EDGE_SEARCH: f64 = 1.0e-9;
-
-/// Surfaces whose opposite boundaries are no further apart than this count as closed, mm.
-pub const SEAM: f64 = 1.0e-6;

@@ -1,0 +1,145 @@
+//! Virtual digitizing: the height of every position of a run.
+//!
+//! Positions are independent of each other, so they are cut into chunks that threads take in turn.
+//! The winner of the last position and the one a revolution ago only tell where to look first: a
+//! chunk that starts without them finds the same winners.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use crate::contact::Pose;
+use crate::cutter::Cutter;
+use crate::job::{Contact, Job, Method};
+use crate::motion::Trajectory;
+use crate::path::Touch;
+use crate::row::Row;
+use crate::tree::{
+    Candidate, Counters, FacetCandidate, PointCandidate, Tree, Winner, facet_candidates,
+    point_candidates,
+};
+
+/// Positions that one thread takes at a time.
+pub const CHUNK: u64 = 1024;
+
+/// Rows made ready to be searched.
+#[derive(Debug)]
+pub struct Digitizer {
+    cutter: Cutter,
+    method: Method,
+    candidates: Candidates,
+}
+
+#[derive(Debug)]
+enum Candidates {
+    Points(Tree<PointCandidate>),
+    Facets(Tree<FacetCandidate>),
+}
+
+impl Digitizer {
+    /// Makes rows ready; they are in order of their ids. Runs on the current thread pool.
+    pub fn new(job: &Job, rows: &[Row]) -> Self {
+        Self {
+            cutter: job.cutter,
+            method: job.method,
+            candidates: match job.contact {
+                Contact::Point => Candidates::Points(Tree::new(point_candidates(rows))),
+                Contact::Facet => Candidates::Facets(Tree::new(facet_candidates(rows))),
+            },
+        }
+    }
+
+    /// Digitizes consecutive positions on this thread; the rows must hold everything that is in
+    /// reach from them.
+    pub fn run(
+        &self,
+        trajectory: &Trajectory,
+        directions: &[(f64, f64)],
+        positions: Range<u64>,
+    ) -> (Vec<Option<Touch>>, Counters) {
+        match &self.candidates {
+            Candidates::Points(tree) => self.run_on(tree, trajectory, directions, positions),
+            Candidates::Facets(tree) => self.run_on(tree, trajectory, directions, positions),
+        }
+    }
+
+    fn run_on<C: Candidate>(
+        &self,
+        tree: &Tree<C>,
+        trajectory: &Trajectory,
+        directions: &[(f64, f64)],
+        positions: Range<u64>,
+    ) -> (Vec<Option<Touch>>, Counters) {
+        let revolution = u64::from(trajectory.points_per_revolution);
+        let mut winners: Vec<Option<Winner>> = Vec::new();
+        let mut counters = Counters::default();
+        for index in positions {
+            let (cos, sin) = directions[(index % revolution) as usize];
+            let x = trajectory.travel(index);
+            let pose = Pose { x, cos, sin };
+            let mut best = None;
+            let cost = match self.method {
+                Method::Brute => tree.try_all(&self.cutter, &pose, &mut best),
+                Method::Exact => {
+                    let done = winners.len();
+                    let last = done.checked_sub(1);
+                    let turn_ago = done.checked_sub(revolution as usize);
+                    for hint in [last, turn_ago].into_iter().flatten() {
+                        if let Some(winner) = &winners[hint] {
+                            tree.try_place(winner.place, &self.cutter, &pose, &mut best);
+                            counters.evaluations += 1;
+                        }
+                    }
+                    tree.search(&self.cutter, &pose, &mut best)
+                }
+            };
+            counters += cost;
+            winners.push(best);
+        }
+        (
+            winners.into_iter().map(|w| w.map(|w| w.touch)).collect(),
+            counters,
+        )
+    }
+
+    /// Digitizes consecutive positions on the current thread pool, chunk by chunk, in order.
+    /// `deliver` gets each chunk's first position and its touches; it returns `false` to stop.
+    pub fn run_chunks(
+        &self,
+        trajectory: &Trajectory,
+        positions: Range<u64>,
+        mut deliver: impl FnMut(u64, Vec<Option<Touch>>) -> bool,
+    ) -> Counters {
+        let directions = trajectory.directions();
+        let threads = rayon::current_num_threads() as u64;
+        let mut counters = Counters::default();
+        let mut next = positions.start;
+        while next < positions.end {
+            // A few chunks for each thread at a time keep the results in order and in bounds.
+            let end = positions.end.min(next + 4 * threads * CHUNK);
+            let starts: Vec<u64> = (next..end).step_by(CHUNK as usize).collect();
+            let chunks: Vec<_> = starts
+                .into_par_iter()
+                .map(|start| {
+                    let run = start..end.min(start + CHUNK);
+                    (start, self.run(trajectory, &directions, run))
+                })
+                .collect();
+            for (start, (touches, cost)) in chunks {
+                counters += cost;
+                if !deliver(start, touches) {
+                    return counters;
+                }
+            }
+            next = end;
+        }
+        counters
+    }
+}
+
+impl std::ops::AddAssign for Counters {
+    fn add_assign(&mut self, other: Self) {
+        self.evaluations += other.evaluations;
+        self.nodes += other.nodes;
+    }
+}

@@ -1,0 +1,204 @@
+//! The discrete model: from surfaces and meshes to rows.
+//!
+//! A surface becomes a grid, either of a stated size (eqs. 1–3 of the 2001 paper) or as fine as a
+//! chordal tolerance asks; a mesh is cut into slabs along the spindle. Nothing is welded across
+//! seams and no degenerate facet is removed: the contact with a facet copes with both.
+
+use std::collections::HashMap;
+
+use crate::error::{Error, Result};
+use crate::job::Discretization;
+use crate::part::{Mesh, Part, Shape};
+use crate::refine::refine;
+use crate::row::{Row, RowKind};
+use crate::surface::{Direction, Surface};
+use crate::vector::Point;
+
+/// Facets in one slab of a mesh: few enough that a worker's overlap is thin, enough that a row is
+/// worth sending.
+const SLAB_FACETS: usize = 256;
+
+/// Most rows, and most columns, of one surface.
+pub(crate) const MAX_LINES: usize = 1 << 20;
+
+/// The part's discrete model.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Model {
+    /// All rows; row `i` has the id `i`.
+    pub rows: Vec<Row>,
+    /// What became of each body, in order.
+    pub bodies: Vec<BodyModel>,
+}
+
+/// What became of one body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodyModel {
+    /// The body's name.
+    pub name: String,
+    /// Its first row.
+    pub first_row: u32,
+    /// Its rows.
+    pub rows: u32,
+    /// Points on each row of a grid; of a mesh, 0.
+    pub columns: u32,
+    /// Largest distance from the surface to its facets that sampling found, mm; `None` if the
+    /// grid's size was given or the body is a mesh.
+    pub deviation: Option<f64>,
+}
+
+/// Makes the rows of every body.
+///
+/// # Errors
+/// [`Error::EmptyPart`], [`Error::GridTooLarge`] or [`Error::ToleranceNotReached`].
+pub fn discretize(part: &Part, discretization: Discretization) -> Result<Model> {
+    part.validate()?;
+    discretization.validate()?;
+    let mut model = Model::default();
+    for body in &part.bodies {
+        let first_row = model.rows.len() as u32;
+        let (columns, deviation) = match &body.shape {
+            Shape::Mesh(mesh) => {
+                add_slabs(&mut model.rows, mesh);
+                (0, None)
+            }
+            Shape::Surface(surface) => {
+                let surface = surface.clone().along_x();
+                let grid = lines(&body.name, &surface, discretization)?;
+                add_isolines(&mut model.rows, &surface, &grid);
+                (grid.vs.len() as u32, grid.deviation)
+            }
+        };
+        model.bodies.push(BodyModel {
+            name: body.name.clone(),
+            first_row,
+            rows: model.rows.len() as u32 - first_row,
+            columns,
+            deviation,
+        });
+    }
+    Ok(model)
+}
+
+/// The parameters of a grid's lines.
+pub(crate) struct Lines {
+    pub us: Vec<f64>,
+    pub vs: Vec<f64>,
+    pub deviation: Option<f64>,
+}
+
+fn lines(name: &str, surface: &Surface, discretization: Discretization) -> Result<Lines> {
+    match discretization {
+        Discretization::Tolerance(tolerance) => refine(name, surface, tolerance),
+        Discretization::Grid { rows, columns } => {
+            let (rows, columns) = (rows as usize, columns as usize);
+            if rows.max(columns) > MAX_LINES {
+                return Err(Error::GridTooLarge {
+                    name: name.to_owned(),
+                    rows,
+                    columns,
+                    limit: MAX_LINES,
+                });
+            }
+            Ok(Lines {
+                us: evenly(surface.u(), rows),
+                vs: evenly(surface.v(), columns),
+                deviation: None,
+            })
+        }
+    }
+}
+
+/// `n` evenly spaced parameters, both ends of the domain included: eq. (2).
+fn evenly(direction: &Direction, n: usize) -> Vec<f64> {
+    let (low, high) = direction.domain();
+    let last = (n - 1) as f64;
+    let inner = (0..n - 1).map(|i| low + (high - low) * (i as f64 / last));
+    inner.chain([high]).collect()
+}
+
+fn add_isolines(rows: &mut Vec<Row>, surface: &Surface, grid: &Lines) {
+    let points = surface.grid(&grid.us, &grid.vs);
+    let last = grid.us.len() - 1;
+    for (i, points) in points.chunks_exact(grid.vs.len()).enumerate() {
+        rows.push(Row {
+            id: rows.len() as u32,
+            points: points.to_vec(),
+            kind: RowKind::Isoline {
+                joins_next: i < last,
+            },
+        });
+    }
+}
+
+fn add_slabs(rows: &mut Vec<Row>, mesh: &Mesh) {
+    let vertex = |v: u32| mesh.vertices()[v as usize];
+    let middle = |t: &[u32; 3]| t.iter().map(|&v| vertex(v)[0]).sum::<f64>();
+    let mut order: Vec<&[u32; 3]> = mesh.triangles().iter().collect();
+    // The sort is stable, so triangles at the same place stay in file order.
+    order.sort_by(|a, b| middle(a).total_cmp(&middle(b)));
+    for slab in order.chunks(SLAB_FACETS) {
+        let mut points: Vec<Point> = Vec::new();
+        let mut local = HashMap::new();
+        let facets = slab.iter().map(|t| {
+            t.map(|v| {
+                *local.entry(v).or_insert_with(|| {
+                    points.push(vertex(v));
+                    points.len() as u32 - 1
+                })
+            })
+        });
+        let facets = facets.collect();
+        rows.push(Row {
+            id: rows.len() as u32,
+            points,
+            kind: RowKind::Slab { facets },
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::part::Body;
+    use crate::row::outlines;
+    use crate::surface::tests::quarter_cylinder;
+
+    fn part(shape: Shape) -> Part {
+        Part {
+            bodies: vec![Body {
+                name: "body".to_owned(),
+                shape,
+            }],
+        }
+    }
+
+    #[test]
+    fn a_grid_has_both_ends_and_its_rows_across_the_spindle() {
+        let surface = quarter_cylinder(5.0, 10.0).transposed();
+        let size = Discretization::Grid {
+            rows: 3,
+            columns: 5,
+        };
+        let model = discretize(&part(Shape::Surface(surface)), size).expect("valid");
+        let xs: Vec<_> = model.rows.iter().map(|r| r.points[0][0]).collect();
+        assert_eq!(xs, [0.0, 5.0, 10.0]);
+        assert!(model.rows.iter().all(|r| r.points.len() == 5));
+        let outlines = outlines(&model.rows);
+        assert_eq!(outlines[0].x.high, 5.0, "facets reach up to the next row");
+        assert_eq!(outlines[2].facets, 0);
+    }
+
+    #[test]
+    fn slabs_hold_every_triangle_once() {
+        let n = 1000;
+        let vertices = (0..n + 2).map(|i| [f64::from(i % 37), f64::from(i), 0.0]);
+        let triangles = (0..n as u32).map(|i| [i, i + 1, i + 2]).collect();
+        let mesh = Mesh::new("m", vertices.collect(), triangles).expect("valid");
+        let model = discretize(&part(Shape::Mesh(mesh)), Discretization::Tolerance(0.1));
+        let model = model.expect("valid");
+        assert_eq!(model.rows.len(), 4);
+        let facets: u64 = outlines(&model.rows).iter().map(|o| o.facets).sum();
+        assert_eq!(facets, n as u64);
+        model.rows.iter().for_each(|r| r.validate().expect("valid"));
+    }
+}

@@ -1,0 +1,224 @@
+//! Extents: which positions, and which rows, each worker gets.
+//!
+//! Positions are cut by x into runs of equal predicted work; an extent needs every row that the
+//! cutter can reach from its positions. Both are decided here, once, whatever the distribution.
+
+use crate::cutter::Cutter;
+use crate::job::Method;
+use crate::motion::Trajectory;
+use crate::row::Outline;
+use crate::vector::Interval;
+
+/// A run of positions and the rows in reach from them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Extent {
+    /// Number of the extent in the job.
+    pub id: u32,
+    /// Index of its first position.
+    pub first: u64,
+    /// Number of its positions.
+    pub count: u64,
+    /// Ids of the rows it needs, in order.
+    pub rows: Vec<u32>,
+}
+
+/// Places at which the predicted work is looked at.
+const SAMPLES: u64 = 4096;
+
+/// Cuts the trajectory into at most `parts` extents of about equal predicted work, none empty.
+pub fn split(
+    trajectory: &Trajectory,
+    outlines: &[Outline],
+    cutter: &Cutter,
+    method: Method,
+    parts: u32,
+) -> Vec<Extent> {
+    let w = cutter.half_width();
+    let reach = Reach::new(outlines);
+    let blocks = trajectory.positions.min(SAMPLES);
+    let block =
+        |i: u64| (u128::from(trajectory.positions) * u128::from(i) / u128::from(blocks)) as u64;
+    let mut total = 0.0;
+    let work: Vec<f64> = (0..blocks)
+        .map(|i| {
+            let positions = block(i)..block(i + 1);
+            let x = trajectory.travel((positions.start + positions.end) / 2);
+            let candidates = reach.candidates(Interval {
+                low: x - w,
+                high: x + w,
+            });
+            total += (positions.end - positions.start) as f64 * predicted(method, candidates);
+            total
+        })
+        .collect();
+    // The k-th cut is where the work so far first reaches its share.
+    let cut = |k: u32| {
+        let share = total * f64::from(k) / f64::from(parts);
+        block((work.partition_point(|&w| w < share) as u64 + 1).min(blocks))
+    };
+    let mut cuts: Vec<u64> = (1..parts).map(cut).collect();
+    cuts.insert(0, 0);
+    cuts.push(trajectory.positions);
+    cuts.dedup();
+    (0..)
+        .zip(cuts.windows(2))
+        .map(|(id, ends)| Extent {
+            id,
+            first: ends[0],
+            count: ends[1] - ends[0],
+            rows: rows_within(
+                outlines,
+                trajectory.travel_of(ends[0], ends[1] - ends[0]).widened(w),
+            ),
+        })
+        .collect()
+}
+
+/// Predicted work of a position with so many candidates within the cutter's width. The exact
+/// search descends a tree, brute force tries all; a position with nothing in reach is nearly free.
+fn predicted(method: Method, candidates: u64) -> f64 {
+    let n = candidates as f64;
+    match method {
+        Method::Exact => 0.05 + (1.0 + n).log2(),
+        Method::Brute => 0.05 + n,
+    }
+}
+
+/// Ids of the rows of which something lies within `window`, with the rows their facets lead to.
+fn rows_within(outlines: &[Outline], window: Interval) -> Vec<u32> {
+    let mut rows = Vec::new();
+    let mut wanted = false;
+    for (id, outline) in (0u32..).zip(outlines) {
+        let meets = outline.x.meets(window);
+        if wanted || meets {
+            rows.push(id);
+        }
+        wanted = meets && outline.joins_next;
+    }
+    rows
+}
+
+/// How many candidates lie within a window, by the ends of the rows in order.
+struct Reach {
+    lows: Vec<(f64, u64)>,
+    highs: Vec<(f64, u64)>,
+}
+
+impl Reach {
+    fn new(outlines: &[Outline]) -> Self {
+        let cumulative = |end: fn(&Outline) -> f64| {
+            let mut ends: Vec<(f64, u64)> = outlines
+                .iter()
+                .map(|o| (end(o), o.points.max(o.facets)))
+                .collect();
+            ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let mut sum = 0;
+            for (_, n) in &mut ends {
+                sum += *n;
+                *n = sum;
+            }
+            ends
+        };
+        Self {
+            lows: cumulative(|o| o.x.low),
+            highs: cumulative(|o| o.x.high),
+        }
+    }
+
+    fn candidates(&self, window: Interval) -> u64 {
+        let before = |ends: &[(f64, u64)], i: usize| i.checked_sub(1).map_or(0, |i| ends[i].1);
+        let begun = self.lows.partition_point(|e| e.0 <= window.high);
+        let ended = self.highs.partition_point(|e| e.0 < window.low);
+        before(&self.lows, begun).saturating_sub(before(&self.highs, ended))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::MotionKind;
+    use proptest::prelude::*;
+
+    fn outlines() -> impl Strategy<Value = Vec<Outline>> {
+        let row = (-10.0..110.0_f64, 0.0..20.0_f64, any::<bool>());
+        prop::collection::vec(row, 1..60).prop_map(|rows| {
+            let last = rows.len() - 1;
+            let outline = |(i, (low, width, joins)): (usize, (f64, f64, bool))| Outline {
+                x: Interval {
+                    low,
+                    high: low + width,
+                },
+                joins_next: joins && i < last,
+                points: 10,
+                facets: 18,
+            };
+            rows.into_iter().enumerate().map(outline).collect()
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn extents_partition_the_positions_and_hold_what_is_in_reach(
+            outlines in outlines(),
+            positions in 1..5000_u64,
+            parts in 1..20_u32,
+            radius in 0.5..30.0_f64,
+        ) {
+            let cutter = Cutter::ball(radius).expect("valid");
+            let trajectory = Trajectory {
+                kind: MotionKind::Helix,
+                from: -5.0,
+                step: 3.0,
+                points_per_revolution: 40,
+                positions,
+            };
+            let extents = split(&trajectory, &outlines, &cutter, Method::Exact, parts);
+            prop_assert!(extents.len() <= parts as usize);
+            let mut next = 0;
+            for (i, e) in extents.iter().enumerate() {
+                prop_assert_eq!((e.id as usize, e.first), (i, next));
+                prop_assert!(e.count > 0);
+                next += e.count;
+                for index in [e.first, e.first + e.count - 1] {
+                    let x = trajectory.travel(index);
+                    for (id, o) in (0u32..).zip(&outlines) {
+                        if o.x.low <= x + radius && o.x.high >= x - radius {
+                            prop_assert!(e.rows.contains(&id));
+                            prop_assert!(!o.joins_next || e.rows.contains(&(id + 1)));
+                        }
+                    }
+                }
+            }
+            prop_assert_eq!(next, positions);
+        }
+    }
+
+    #[test]
+    fn work_is_shared_where_the_part_is() {
+        let outlines: Vec<Outline> = (0..100)
+            .map(|i| Outline {
+                x: Interval {
+                    low: f64::from(i),
+                    high: f64::from(i + 1),
+                },
+                joins_next: false,
+                points: 100,
+                facets: 0,
+            })
+            .collect();
+        let trajectory = Trajectory {
+            kind: MotionKind::Helix,
+            from: -100.0,
+            step: 1.0,
+            points_per_revolution: 100,
+            positions: 20_001,
+        };
+        let cutter = Cutter::ball(1.0).expect("valid");
+        let halves = split(&trajectory, &outlines, &cutter, Method::Exact, 2);
+        let cut = trajectory.travel(halves[1].first);
+        assert!(
+            (cut - 50.0).abs() < 2.0,
+            "the empty first half is free: {cut}"
+        );
+    }
+}

@@ -1,0 +1,106 @@
+//! Rows: the unit in which a part is searched and distributed.
+//!
+//! A row stands for itself: it carries its points, and its number in the part fixes the number of
+//! every candidate in it, so that a worker that holds some rows and a process that holds all of them
+//! speak of the same candidates. Facets of a grid lie between consecutive rows that are both held.
+
+use crate::error::{Error, Result};
+use crate::part::check_points;
+use crate::vector::{Interval, Point};
+
+/// One isoline of a grid, or one slab of a mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Number in the part, counted over all bodies.
+    pub id: u32,
+    /// Points, mm.
+    pub points: Vec<Point>,
+    /// What the points belong to.
+    pub kind: RowKind,
+}
+
+/// What a row's points belong to.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RowKind {
+    /// One u-isoline of a surface.
+    Isoline {
+        /// Whether row `id + 1` is the next isoline of the same surface.
+        joins_next: bool,
+    },
+    /// Triangles of a mesh that lie near each other along the spindle.
+    Slab {
+        /// Indices into the row's points.
+        facets: Vec<[u32; 3]>,
+    },
+}
+
+/// What a plan has to know of a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outline {
+    /// Extent along the spindle of the row and of its facets, those up to the next row included.
+    pub x: Interval,
+    /// Whether its facets need row `id + 1`.
+    pub joins_next: bool,
+    /// Number of points.
+    pub points: u64,
+    /// Number of facets.
+    pub facets: u64,
+}
+
+impl Row {
+    /// Checks a row that came from outside.
+    ///
+    /// # Errors
+    /// [`Error::BadRow`] if a facet names a point that is not there; those of points that are not
+    /// finite or too far out.
+    pub fn validate(&self) -> Result<()> {
+        check_points("a row", "point", &self.points)?;
+        let points = self.points.len();
+        let facets: &[[u32; 3]] = match &self.kind {
+            RowKind::Isoline { .. } => &[],
+            RowKind::Slab { facets } => facets,
+        };
+        match facets
+            .iter()
+            .position(|f| f.iter().any(|&p| p as usize >= points))
+        {
+            None => Ok(()),
+            Some(facet) => Err(Error::BadRow {
+                row: self.id,
+                facet,
+                points,
+            }),
+        }
+    }
+
+    /// Extent of the points along the spindle.
+    fn x(&self) -> Interval {
+        Interval::of(self.points.iter().map(|p| p[0]))
+    }
+}
+
+/// The outlines of a part's rows, which must be complete and in order.
+pub fn outlines(rows: &[Row]) -> Vec<Outline> {
+    let outline = |(i, row): (usize, &Row)| {
+        let own = Outline {
+            x: row.x(),
+            joins_next: false,
+            points: row.points.len() as u64,
+            facets: 0,
+        };
+        match &row.kind {
+            RowKind::Isoline { joins_next: false } => own,
+            RowKind::Isoline { joins_next: true } => Outline {
+                x: own.x.hull(rows[i + 1].x()),
+                joins_next: true,
+                facets: 2 * (own.points - 1),
+                ..own
+            },
+            RowKind::Slab { facets } => Outline {
+                facets: facets.len() as u64,
+                ..own
+            },
+        }
+    };
+    rows.iter().enumerate().map(outline).collect()
+}
