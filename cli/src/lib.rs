@@ -1,2 +1,66 @@
-//! The horma command.
-pub fn main() -> std::process::ExitCode { std::process::ExitCode::SUCCESS }
+//! The `horma` command: what was typed becomes a call, and its end an exit code.
+//!
+//! Everything that touches the user is here and nothing else: arguments, progress, signals, messages.
+
+mod args;
+mod error;
+
+mod run;
+
+mod cluster;
+mod here;
+mod submit;
+
+mod inspect;
+mod serve;
+
+mod progress;
+mod system;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Arguments, Command};
+use error::{Error, Result};
+
+/// Runs the command that the process was started with.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let filter = tracing_subscriber::EnvFilter::builder().parse_lossy(&arguments.log);
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(false)
+        .init();
+    match execute(arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Error::Interrupted) => ExitCode::from(Error::Interrupted.exit_code()),
+        Err(error) => {
+            // Standard error may be closed; the exit code still tells.
+            let _ = writeln!(std::io::stderr(), "horma: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn execute(arguments: Arguments) -> Result<()> {
+    match arguments.command {
+        Command::Run(run) => run::run(&run),
+        Command::Submit(submit) => run::submit(&submit),
+        Command::Master(master) => serve::master(&master),
+        Command::Worker(worker) => serve::worker(worker),
+        Command::Init { directory } => inspect::init(&directory),
+        Command::Inspect { files } => inspect::inspect(&files),
+        Command::Completions { shell } => {
+            args::print_completions(shell);
+            Ok(())
+        }
+    }
+}
+
+/// Writes to standard output; a reader that has gone away is no error.
+fn say(text: &str) {
+    let _ = writeln!(std::io::stdout(), "{text}");
+}

@@ -140,14 +140,14 @@ impl Cutter {
                 minor_radius,
             } => {
                 let q = minor_radius * minor_radius - d * d;
-                (q >= 0.0).then(|| major_radius + q.sqrt())
+                (q >= 0.0).then_some(major_radius + q.sqrt())
             }
             Self::Cone {
                 radius,
                 width,
                 slope,
                 ..
-            } => (d.abs() <= width / 2.0).then(|| radius + d * slope),
+            } => (d.abs() <= width / 2.0).then_some(radius + d * slope),
         }
     }
 }

@@ -13,10 +13,10 @@ use crate::cutter::Cutter;
 use crate::job::{Contact, Job, Method};
 use crate::motion::Trajectory;
 use crate::path::Touch;
+use crate::record::Counters;
 use crate::row::Row;
 use crate::tree::{
-    Candidate, Counters, FacetCandidate, PointCandidate, Tree, Winner, facet_candidates,
-    point_candidates,
+    Candidate, FacetCandidate, PointCandidate, Tree, Winner, facet_candidates, point_candidates,
 };
 
 /// Positions that one thread takes at a time.
@@ -134,12 +134,5 @@ impl Digitizer {
             next = end;
         }
         counters
-    }
-}
-
-impl std::ops::AddAssign for Counters {
-    fn add_assign(&mut self, other: Self) {
-        self.evaluations += other.evaluations;
-        self.nodes += other.nodes;
     }
 }

@@ -9,10 +9,11 @@ use std::collections::HashMap;
 use crate::error::{Error, Result};
 use crate::job::Discretization;
 use crate::part::{Mesh, Part, Shape};
+use crate::record::BodyRecord;
 use crate::refine::refine;
-use crate::row::{Row, RowKind};
+use crate::row::{Outline, Row, RowKind, outlines};
 use crate::surface::{Direction, Surface};
-use crate::vector::Point;
+use crate::vector::{Interval, Point};
 
 /// Facets in one slab of a mesh: few enough that a worker's overlap is thin, enough that a row is
 /// worth sending.
@@ -26,24 +27,10 @@ pub(crate) const MAX_LINES: usize = 1 << 20;
 pub struct Model {
     /// All rows; row `i` has the id `i`.
     pub rows: Vec<Row>,
+    /// The outline of each row.
+    pub outlines: Vec<Outline>,
     /// What became of each body, in order.
-    pub bodies: Vec<BodyModel>,
-}
-
-/// What became of one body.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BodyModel {
-    /// The body's name.
-    pub name: String,
-    /// Its first row.
-    pub first_row: u32,
-    /// Its rows.
-    pub rows: u32,
-    /// Points on each row of a grid; of a mesh, 0.
-    pub columns: u32,
-    /// Largest distance from the surface to its facets that sampling found, mm; `None` if the
-    /// grid's size was given or the body is a mesh.
-    pub deviation: Option<f64>,
+    pub bodies: Vec<BodyRecord>,
 }
 
 /// Makes the rows of every body.
@@ -55,26 +42,31 @@ pub fn discretize(part: &Part, discretization: Discretization) -> Result<Model> 
     discretization.validate()?;
     let mut model = Model::default();
     for body in &part.bodies {
-        let first_row = model.rows.len() as u32;
+        let first_row = model.rows.len();
         let (columns, deviation) = match &body.shape {
             Shape::Mesh(mesh) => {
                 add_slabs(&mut model.rows, mesh);
-                (0, None)
+                (None, None)
             }
             Shape::Surface(surface) => {
                 let surface = surface.clone().along_x();
                 let grid = lines(&body.name, &surface, discretization)?;
                 add_isolines(&mut model.rows, &surface, &grid);
-                (grid.vs.len() as u32, grid.deviation)
+                (Some(grid.vs.len() as u32), grid.deviation)
             }
         };
-        model.bodies.push(BodyModel {
+        let rows = outlines(&model.rows[first_row..]);
+        let x = rows.iter().fold(Interval::EMPTY, |x, r| x.hull(r.x));
+        model.bodies.push(BodyRecord {
             name: body.name.clone(),
-            first_row,
-            rows: model.rows.len() as u32 - first_row,
+            rows: rows.len() as u32,
             columns,
+            points: rows.iter().map(|r| r.points).sum(),
+            facets: rows.iter().map(|r| r.facets).sum(),
+            x: [x.low, x.high],
             deviation,
         });
+        model.outlines.extend(rows);
     }
     Ok(model)
 }
@@ -160,7 +152,6 @@ fn add_slabs(rows: &mut Vec<Row>, mesh: &Mesh) {
 mod tests {
     use super::*;
     use crate::part::Body;
-    use crate::row::outlines;
     use crate::surface::tests::quarter_cylinder;
 
     fn part(shape: Shape) -> Part {
@@ -183,7 +174,7 @@ mod tests {
         let xs: Vec<_> = model.rows.iter().map(|r| r.points[0][0]).collect();
         assert_eq!(xs, [0.0, 5.0, 10.0]);
         assert!(model.rows.iter().all(|r| r.points.len() == 5));
-        let outlines = outlines(&model.rows);
+        let outlines = &model.outlines;
         assert_eq!(outlines[0].x.high, 5.0, "facets reach up to the next row");
         assert_eq!(outlines[2].facets, 0);
     }
@@ -197,7 +188,7 @@ mod tests {
         let model = discretize(&part(Shape::Mesh(mesh)), Discretization::Tolerance(0.1));
         let model = model.expect("valid");
         assert_eq!(model.rows.len(), 4);
-        let facets: u64 = outlines(&model.rows).iter().map(|o| o.facets).sum();
+        let facets: u64 = model.outlines.iter().map(|o| o.facets).sum();
         assert_eq!(facets, n as u64);
         model.rows.iter().for_each(|r| r.validate().expect("valid"));
     }

@@ -59,6 +59,18 @@ pub enum Error {
         /// Most rows, and most columns.
         limit: usize,
     },
+    /// A job that would not fit into memory.
+    #[error("the job has {points} points and {positions} positions, which would take {:.1} GB of memory where {:.1} GB are available; choose a coarser grid or tolerance, a larger step or fewer points per revolution", needed / 1e9, *available as f64 / 1e9)]
+    OutOfMemory {
+        /// Points of the discrete model.
+        points: f64,
+        /// Positions of the path.
+        positions: u64,
+        /// Memory that they would take, bytes.
+        needed: f64,
+        /// Memory there is, bytes.
+        available: u64,
+    },
     /// Nothing to machine.
     #[error("the part is empty: it has no surface and no triangle")]
     EmptyPart,

@@ -24,6 +24,7 @@ mod discretize;
 mod row;
 
 mod extent;
+mod plan;
 
 mod contact;
 
@@ -35,18 +36,21 @@ mod digitize;
 
 mod path;
 
+mod record;
+
 pub use cutter::Cutter;
 pub use digitize::{CHUNK, Digitizer};
-pub use discretize::{BodyModel, Model, discretize};
+pub use discretize::{Model, discretize};
 pub use error::{Error, Result};
-pub use extent::{Extent, split};
+pub use extent::Extent;
 pub use job::{Contact, Discretization, Job, Method};
 pub use motion::{Motion, MotionKind, Trajectory};
 pub use part::{Body, Mesh, Part, Shape};
 pub use path::{SubTrajectory, ToolPath, Touch, stitch};
 pub use placement::{Axis, place};
-pub use row::{Outline, Row, RowKind, outlines};
+pub use plan::Plan;
+pub use record::{BodyRecord, Counters, ExtentRecord, LostAttempt, Phase, Record, WorkerRecord};
+pub use row::{Outline, Row, RowKind};
 pub use surface::{Direction, MAX_DEGREE, Surface};
 pub use tolerance::MAX_COORDINATE;
-pub use tree::Counters;
 pub use vector::{Interval, Point, cross, dot, length, sub, unit};

@@ -79,8 +79,8 @@ impl Row {
     }
 }
 
-/// The outlines of a part's rows, which must be complete and in order.
-pub fn outlines(rows: &[Row]) -> Vec<Outline> {
+/// The outlines of a body's rows, which must be complete and in order.
+pub(crate) fn outlines(rows: &[Row]) -> Vec<Outline> {
     let outline = |(i, row): (usize, &Row)| {
         let own = Outline {
             x: row.x(),

@@ -9,6 +9,7 @@ use crate::bound::Patch;
 use crate::contact::{Pose, touch_facet, touch_point};
 use crate::cutter::Cutter;
 use crate::path::Touch;
+use crate::record::Counters;
 use crate::row::{Row, RowKind};
 use crate::vector::{Interval, Point};
 
@@ -127,15 +128,6 @@ pub(crate) struct Winner {
     id: u64,
     /// Place in the tree: a hint for the next position.
     pub place: u32,
-}
-
-/// What a search cost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counters {
-    /// Candidates whose height was computed.
-    pub evaluations: u64,
-    /// Nodes whose bound was computed.
-    pub nodes: u64,
 }
 
 /// The hierarchy.

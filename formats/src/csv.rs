@@ -1,1 +1,247 @@
-//! To be written.
+//! `path.csv`: one line a position, numbers in the shortest form that reads back to the same bits.
+//!
+//! Two runs of the same job give the same bytes, so the file is compared with `cmp`. It does not
+//! describe the job; that is the report's.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+use std::path::Path;
+
+use horma_core::{ToolPath, Touch};
+
+use crate::error::{Error, Result};
+use crate::output;
+
+/// The first line of the file.
+pub const HEADER: &str = "index,x,angle,y,contact_x,contact_y,contact_z";
+
+/// Text that is gathered before it is handed on, in bytes.
+const CHUNK: usize = 1 << 16;
+
+/// One line of a file that was read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Index of the position.
+    pub index: u64,
+    /// Travel along the spindle, mm.
+    pub x: f64,
+    /// Unwound angle, degrees.
+    pub angle: f64,
+    /// Tool centre and contact; `None` where nothing was in reach.
+    pub touch: Option<Touch>,
+}
+
+/// Writes `path` to `file`: beside it first, then renamed.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be written.
+pub fn save(file: &Path, path: &ToolPath) -> Result<()> {
+    output::write(file, |out| write(path, out))
+}
+
+/// Writes `path` to `out`; y and the contact are empty where nothing is in reach.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write(path: &ToolPath, out: &mut impl Write) -> io::Result<()> {
+    let mut text = String::with_capacity(CHUNK + 256);
+    text.push_str(HEADER);
+    text.push('\n');
+    for (index, touch) in (0u64..).zip(&path.touches) {
+        let x = path.trajectory.travel(index);
+        let angle = path.trajectory.angle(index);
+        // Formatting into a string cannot fail.
+        let _ = write!(text, "{index}");
+        number(&mut text, x);
+        number(&mut text, angle);
+        match touch {
+            Some(Touch { height, contact }) => {
+                number(&mut text, *height);
+                contact.iter().for_each(|&c| number(&mut text, c));
+            }
+            None => text.push_str(",,,,"),
+        }
+        text.push('\n');
+        if text.len() >= CHUNK {
+            out.write_all(text.as_bytes())?;
+            text.clear();
+        }
+    }
+    out.write_all(text.as_bytes())
+}
+
+/// A comma and the shortest text that reads back to `value`, without exponent or negative zero.
+fn number(text: &mut String, value: f64) {
+    text.push(',');
+    let value = value + 0.0;
+    let mut buffer = zmij::Buffer::new();
+    let digits = buffer.format_finite(value);
+    if digits.contains('e') {
+        // Very large or very small. The same digits, only slower.
+        let _ = write!(text, "{value}");
+    } else {
+        text.push_str(digits.strip_suffix(".0").unwrap_or(digits));
+    }
+}
+
+/// Reads a file that [`save`] wrote.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read, [`Error::BadCsvLine`] for the first line that is not what
+/// [`write`] writes.
+pub fn read(file: &Path) -> Result<Vec<Row>> {
+    let text = std::fs::read_to_string(file).map_err(|source| Error::io(file, source))?;
+    let bad = |line: usize, expected, found: &str| Error::BadCsvLine {
+        path: file.to_owned(),
+        line,
+        expected,
+        found: found.to_owned(),
+    };
+    let mut lines = (1..).zip(text.lines());
+    match lines.next() {
+        Some((_, HEADER)) => {}
+        first => return Err(bad(1, HEADER, first.map_or("", |(_, l)| l))),
+    }
+    let mut rows = Vec::new();
+    for (number, line) in lines {
+        let row = parse(line).ok_or_else(|| bad(number, SHAPE, line))?;
+        if row.index != rows.len() as u64 {
+            return Err(bad(number, "the index that follows the line before", line));
+        }
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+/// What a line is, for the message.
+const SHAPE: &str = "an index and six numbers, the last four all there or all empty";
+
+fn parse(line: &str) -> Option<Row> {
+    let (index, rest) = line.split_once(',')?;
+    let mut fields = [""; 6];
+    let mut found = rest.split(',');
+    for field in &mut fields {
+        *field = found.next()?;
+    }
+    if found.next().is_some() {
+        return None;
+    }
+    let value = |text: &str| text.parse::<f64>().ok().filter(|n| n.is_finite());
+    let [x, angle, y, contact @ ..] = fields;
+    let touch = if y.is_empty() && contact == [""; 3] {
+        None
+    } else {
+        let [cx, cy, cz] = contact.map(value);
+        Some(Touch {
+            height: value(y)?,
+            contact: [cx?, cy?, cz?],
+        })
+    };
+    Some(Row {
+        index: index.parse().ok()?,
+        x: value(x)?,
+        angle: value(angle)?,
+        touch,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use horma_core::{MotionKind, Trajectory};
+
+    use super::*;
+
+    fn path() -> ToolPath {
+        ToolPath {
+            trajectory: Trajectory {
+                kind: MotionKind::Helix,
+                from: -0.2,
+                step: 0.4,
+                points_per_revolution: 4,
+                positions: 4,
+            },
+            touches: vec![
+                Some(Touch {
+                    height: 78.5,
+                    contact: [-0.0, 1.0 / 3.0, 1e-7],
+                }),
+                None,
+                Some(Touch {
+                    height: 0.1 + 0.2,
+                    contact: [1e16, -2.0, -0.0],
+                }),
+                None,
+            ],
+        }
+    }
+
+    fn text(path: &ToolPath) -> String {
+        let mut out = Vec::new();
+        write(path, &mut out).expect("memory");
+        String::from_utf8(out).expect("ASCII")
+    }
+
+    #[test]
+    fn numbers_are_the_shortest_that_round_trip() {
+        let expected = "\
+index,x,angle,y,contact_x,contact_y,contact_z
+0,-0.2,0,78.5,0,0.3333333333333333,0.0000001
+1,-0.1,90,,,,
+2,0,180,0.30000000000000004,10000000000000000,-2,0
+3,0.10000000000000003,270,,,,
+";
+        assert_eq!(text(&path()), expected);
+    }
+
+    #[test]
+    fn numbers_are_as_short_as_the_standard_library_writes_them() {
+        let mut bits = 1u64;
+        for _ in 0..10_000 {
+            bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            for value in [f64::from_bits(bits), bits as f64 * 1e-17] {
+                if value.is_finite() {
+                    let mut text = String::new();
+                    number(&mut text, value);
+                    assert_eq!(text[1..].parse(), Ok(value));
+                    assert_eq!(text.len(), format!(",{value}").len());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_written_reads_back() {
+        let dir = tempfile::tempdir().expect("scratch");
+        let file = dir.path().join("path.csv");
+        let path = path();
+        save(&file, &path).expect("writable");
+        let rows = read(&file).expect("own format");
+        assert_eq!(rows.len(), 4);
+        for (row, touch) in rows.iter().zip(&path.touches) {
+            assert_eq!(row.touch, *touch);
+            assert_eq!(row.x, path.trajectory.travel(row.index));
+            assert_eq!(row.angle, path.trajectory.angle(row.index));
+        }
+    }
+
+    #[test]
+    fn a_bad_line_is_named() {
+        let dir = tempfile::tempdir().expect("scratch");
+        let file = dir.path().join("path.csv");
+        let good = text(&path());
+        for (bad, line) in [
+            (good.replacen("contact_z", "contact", 1), ":1:"),
+            (good.replacen("78.5", "", 1), ":2:"),
+            (good.replacen("78.5", "NaN", 1), ":2:"),
+            (good.replacen("1,-0.1", "3,-0.1", 1), ":3:"),
+            (good.replacen(",,,,", ",,,", 1), ":3:"),
+            (good.replacen(",,,,", ",,,,,", 1), ":3:"),
+            (good.replacen("180", "18O", 1), ":4:"),
+            (String::new(), ":1:"),
+        ] {
+            std::fs::write(&file, bad).expect("writable");
+            let message = read(&file).expect_err("bad line").to_string();
+            assert!(message.contains(line), "{message}");
+        }
+    }
+}

@@ -1,6 +1,9 @@
 //! Everything that can be wrong with a file.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use crate::job::Place;
+use crate::part::Format;
 
 /// What is wrong with a file that was read or written.
 #[derive(Debug, thiserror::Error)]
@@ -13,7 +16,228 @@ pub enum Error {
         /// Why.
         source: std::io::Error,
     },
+    /// A directory for results that is a file.
+    #[error("{}: not a directory; name a new or an empty one", path.display())]
+    NotADirectory {
+        /// What was named.
+        path: PathBuf,
+    },
+    /// A directory for results that holds something else.
+    #[error("{}: holds {entry}, which is no result of ours; name a new or an empty directory", path.display())]
+    ForeignDirectory {
+        /// The directory.
+        path: PathBuf,
+        /// Something in it.
+        entry: String,
+    },
+    /// A file of the user's where the sample would go.
+    #[error("{}: exists already and is not overwritten; name a new directory", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A line of a path that is not what we write.
+    #[error("{}:{line}: expected {expected}, but found {found:?}", path.display())]
+    BadCsvLine {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What the line should be.
+        expected: &'static str,
+        /// The line as found.
+        found: String,
+    },
+    /// A path that cannot be made a program.
+    #[error(
+        "the cutter never touches the part at any of {positions} positions, so there is nothing to cut; check the spindle axis and the range of travel"
+    )]
+    NoContact {
+        /// Number of positions.
+        positions: u64,
+    },
+    /// The numbers of a part or of a job contradict each other or are out of bounds.
+    #[error(transparent)]
+    Core(#[from] horma_core::Error),
+    /// A folder where a part was expected.
+    #[error("{}: this is a folder; name a file in it", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file too large to index.
+    #[error("{}: the file has {length} bytes, more than the {limit} that are read; export it coarser", path.display())]
+    FileTooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its length, bytes.
+        length: u64,
+        /// Longest file that is read, bytes.
+        limit: u64,
+    },
+    /// A file with nothing in it.
+    #[error("{name}: the file is empty; export it again")]
+    EmptyFile {
+        /// The file.
+        name: String,
+    },
+    /// An extension that no reader knows.
+    #[error("{}: parts are read from STL, OBJ and STEP files (.stl, .obj, .step, .stp); export it as one of them", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A format that is not read yet.
+    #[error("{name}: {format} files are not read yet; export it as STEP, STL or OBJ")]
+    NotYet {
+        /// The file.
+        name: String,
+        /// Its format.
+        format: Format,
+    },
+    /// An extension that contradicts the content.
+    #[error("{name}: its extension says {claimed}, but its content is {found}; rename it")]
+    OtherContent {
+        /// The file.
+        name: String,
+        /// What the extension says.
+        claimed: Format,
+        /// What the content is.
+        found: Format,
+    },
+    /// A binary STL file without room for its header.
+    #[error(
+        "{name}: {length} bytes are too few for an STL file, whose header alone has 84; export it again"
+    )]
+    StlTooShort {
+        /// The file.
+        name: String,
+        /// Its length, bytes.
+        length: usize,
+    },
+    /// A binary STL file whose length contradicts its header.
+    #[error(
+        "{name}: the header states {stated} triangles, which take {needed} bytes, but there are {present} in {length} bytes; the file is damaged, export it again"
+    )]
+    StlLength {
+        /// The file.
+        name: String,
+        /// Triangles that the header states.
+        stated: u32,
+        /// Bytes that they take.
+        needed: u64,
+        /// Length of the file, bytes.
+        length: usize,
+        /// Triangles that are there.
+        present: usize,
+    },
+    /// A line of a text format that makes no sense.
+    #[error("{name}: line {line}: {reason}")]
+    Syntax {
+        /// The file.
+        name: String,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A mesh file without a triangle.
+    #[error("{name}: there is no triangle in it; export the part as a mesh or as surfaces")]
+    NoTriangle {
+        /// The file.
+        name: String,
+    },
+    /// A file that is no STEP file, or a damaged one.
+    #[error("{name}: not a readable STEP file: {source}")]
+    StepSyntax {
+        /// The file.
+        name: String,
+        /// What the parser says.
+        source: Box<step_io::Error>,
+    },
+    /// A STEP file without a surface.
+    #[error(
+        "{name}: there is no surface in it; export the part as surfaces or solids, not as curves or a picture"
+    )]
+    NoSurface {
+        /// The file.
+        name: String,
+    },
+    /// A face, a shell, a solid or a placement that could not be read.
+    #[error(
+        "{name}: #{entity} {kind} cannot be read ({reason}); export it as B-spline surfaces, or the part as a mesh (STL)"
+    )]
+    StepLoss {
+        /// The file.
+        name: String,
+        /// Number of the entity in the file.
+        entity: u64,
+        /// Its keyword.
+        kind: String,
+        /// Why.
+        reason: String,
+    },
+    /// Units that cannot be applied.
+    #[error("{name}: {reason}; export it in millimetres")]
+    StepUnits {
+        /// The file.
+        name: String,
+        /// What is wrong with them.
+        reason: String,
+    },
+    /// An assembly that cannot be followed.
+    #[error("{name}: {reason}; export the assembly as one flat part")]
+    StepAssembly {
+        /// The file.
+        name: String,
+        /// What cannot be followed.
+        reason: &'static str,
+    },
+    /// A face that is not the whole of its surface.
+    #[error(
+        "{name} is trimmed inside its surface; export it untrimmed, or the part as a mesh (STL)"
+    )]
+    Trimmed {
+        /// The face.
+        name: String,
+    },
+    /// A face whose edges cannot be read.
+    #[error(
+        "{name} has an edge that cannot be read, so its trim is unknown; export it untrimmed, or the part as a mesh (STL)"
+    )]
+    UnreadableTrim {
+        /// The face.
+        name: String,
+    },
+    /// A kind of surface that is not read.
+    #[error(
+        "{name} lies on a {kind}, which is not read; export it as a B-spline surface, or the part as a mesh (STL)"
+    )]
+    UnsupportedSurface {
+        /// The face.
+        name: String,
+        /// The kind of surface.
+        kind: &'static str,
+    },
+    /// A job file, or a flag, that makes no sense.
+    #[error("{what}{place}")]
+    Job {
+        /// What is wrong, and what would be right.
+        what: String,
+        /// Where.
+        place: Box<Place>,
+    },
 }
 
 /// The result of reading or writing.
 pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// The operating system's refusal, with the file it is about.
+    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
+        Self::Io {
+            path: path.to_owned(),
+            source,
+        }
+    }
+}

@@ -1,1 +1,327 @@
-//! To be written.
+//! `path.ngc`: a program for LinuxCNC and the controls that follow it.
+//!
+//! X is the travel, Y the tool centre along the attack axis, A the unwound rotation of the part.
+//! Inverse-time feed (G93) holds the feed at the contact, where rotation counts as much as travel.
+//! The program starts no spindle and changes no tool: nothing is known of either. Limits of travel,
+//! speed and acceleration are the machine's own.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+use std::path::Path;
+
+use horma_core::{ToolPath, Touch};
+
+use crate::error::{Error, Result};
+use crate::job::Program;
+use crate::output;
+
+/// A line of the program's heading: what it tells (`cutter`) and the text itself.
+pub type Heading<'a> = [(&'static str, &'a str)];
+
+/// Said in every program, after the heading.
+const NOTES: [&str; 4] = [
+    "units: mm and degrees",
+    "X: travel along the spindle axis; Y: attack axis, to the tool centre; A: turn of the part about X, right-handed",
+    "X0 is the part's, Y0 is the spindle axis; under G93 F is 1/min",
+    "start the cutter before this program: it starts no spindle and changes no tool",
+];
+
+/// Units, distances and planes; no compensation, no canned cycle, feed in mm/min.
+const MODES: &str = "G21 G90 G17 G40 G49 G80 G94";
+
+/// Corners may be rounded by this, mm, so that the axes need not stop at each position.
+const BLEND: f64 = 0.01;
+
+/// Decimals of X, Y and A.
+const DECIMALS: usize = 4;
+
+/// Shortest length that a feed is divided by, mm: the resolution of a coordinate.
+const SHORTEST: f64 = 1.0e-4;
+
+/// Longest text of a comment: a line must be shorter than 252 characters.
+const COMMENT: usize = 240;
+
+/// Text that is gathered before it is handed on, in bytes.
+const CHUNK: usize = 1 << 16;
+
+/// Writes `path` as a program to `file`: beside it first, then renamed.
+///
+/// Where the cutter touches nothing it goes as high as the higher of the nearest contacts before
+/// and after; at the ends of the path there is only one.
+///
+/// # Errors
+/// [`Error::NoContact`] if the cutter never touches the part, [`Error::Io`] if the file cannot be
+/// written.
+pub fn save(file: &Path, path: &ToolPath, program: Program, heading: &Heading) -> Result<()> {
+    let stations = bridged(&path.touches).ok_or(Error::NoContact {
+        positions: path.trajectory.positions,
+    })?;
+    output::write(file, |out| write(path, &stations, program, heading, out))
+}
+
+/// Where the tool is at a position, and how far from the spindle axis it cuts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Station {
+    height: f64,
+    reach: f64,
+}
+
+/// A station for each position, or `None` if nothing is touched at all.
+fn bridged(touches: &[Option<Touch>]) -> Option<Vec<Station>> {
+    let station = |t: &Option<Touch>| {
+        t.map(|t| Station {
+            height: t.height,
+            reach: (t.contact[1] * t.contact[1] + t.contact[2] * t.contact[2]).sqrt(),
+        })
+    };
+    let mut before = None;
+    let mut stations: Vec<Option<Station>> = Vec::with_capacity(touches.len());
+    for touch in touches {
+        before = station(touch).or(before);
+        stations.push(before);
+    }
+    let mut after = None;
+    for (place, touch) in stations.iter_mut().zip(touches).rev() {
+        after = station(touch).or(after);
+        *place = match (*place, after) {
+            (Some(a), Some(b)) if a.height < b.height => after,
+            (None, b) => b,
+            (a, _) => a,
+        };
+    }
+    let all: Option<Vec<Station>> = stations.into_iter().collect();
+    all.filter(|s| !s.is_empty())
+}
+
+fn write(
+    path: &ToolPath,
+    stations: &[Station],
+    program: Program,
+    heading: &Heading,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let mut text = String::with_capacity(CHUNK + 1024);
+    let highest = stations.iter().map(|s| s.height).fold(f64::MIN, f64::max);
+    let safe = highest + program.clearance;
+
+    text.push_str("%\n");
+    for (label, value) in heading {
+        comment(&mut text, &format!("{label}: {value}"));
+    }
+    for note in NOTES {
+        comment(&mut text, note);
+    }
+    line(&mut text, MODES, &[]);
+    line(&mut text, "G64", &[('P', BLEND)]);
+    line(&mut text, "G0", &[('Y', safe)]);
+
+    let mut last = None;
+    for (index, station) in (0u64..).zip(stations) {
+        let x = path.trajectory.travel(index);
+        let angle = path.trajectory.angle(index);
+        match last {
+            None => {
+                line(&mut text, "G0", &[('X', x), ('A', angle)]);
+                text.push_str("G1");
+                word(&mut text, 'Y', station.height, DECIMALS);
+                feed_word(&mut text, program.feed);
+                text.push_str("G93\n");
+            }
+            Some((from_x, from_angle, from)) => {
+                let length = cut(x - from_x, angle - from_angle, from, station);
+                text.push_str("G1");
+                word(&mut text, 'X', x, DECIMALS);
+                word(&mut text, 'Y', station.height, DECIMALS);
+                word(&mut text, 'A', angle, DECIMALS);
+                feed_word(&mut text, program.feed / length.max(SHORTEST));
+            }
+        }
+        last = Some((x, angle, station));
+        if text.len() >= CHUNK {
+            out.write_all(text.as_bytes())?;
+            text.clear();
+        }
+    }
+
+    text.push_str("G94\n");
+    line(&mut text, "G0", &[('Y', safe)]);
+    text.push_str("M2\n%\n");
+    out.write_all(text.as_bytes())
+}
+
+/// Length of the cutter's way over the part, mm: travel, attack, and the arc at the contact.
+fn cut(dx: f64, degrees: f64, from: &Station, to: &Station) -> f64 {
+    let dy = to.height - from.height;
+    let arc = 0.5 * (from.reach + to.reach) * degrees.to_radians();
+    (dx * dx + dy * dy + arc * arc).sqrt()
+}
+
+/// A comment of printable ASCII without parentheses, which would end it.
+fn comment(text: &mut String, content: &str) {
+    text.push('(');
+    text.extend(content.chars().take(COMMENT).map(|c| match c {
+        '(' => '[',
+        ')' => ']',
+        ' '..='~' => c,
+        _ => '?',
+    }));
+    text.push_str(")\n");
+}
+
+/// A line of a command and its words.
+fn line(text: &mut String, command: &str, words: &[(char, f64)]) {
+    text.push_str(command);
+    for &(letter, value) in words {
+        word(text, letter, value, DECIMALS);
+    }
+    text.push('\n');
+}
+
+/// F, to six significant digits, never 0; it ends the line.
+fn feed_word(text: &mut String, feed: f64) {
+    let (mut decimals, mut leading) = (5, feed);
+    while leading >= 10.0 && decimals > 0 {
+        (decimals, leading) = (decimals - 1, leading / 10.0);
+    }
+    while leading < 1.0 && decimals < 12 {
+        (decimals, leading) = (decimals + 1, leading * 10.0);
+    }
+    word(text, 'F', feed.max(1.0e-12), decimals);
+    text.push('\n');
+}
+
+/// A letter and a number without exponent, trailing zeros or a negative zero.
+fn word(text: &mut String, letter: char, value: f64, decimals: usize) {
+    text.push(' ');
+    text.push(letter);
+    let start = text.len();
+    // Formatting into a string cannot fail.
+    let _ = write!(text, "{value:.decimals$}");
+    if decimals > 0 {
+        let kept = text.trim_end_matches('0').trim_end_matches('.').len();
+        text.truncate(kept);
+    }
+    if &text[start..] == "-0" {
+        text.replace_range(start.., "0");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use horma_core::{MotionKind, Trajectory};
+
+    use super::*;
+
+    const PROGRAM: Program = Program {
+        feed: 1000.0,
+        clearance: 5.0,
+    };
+
+    /// A path of these heights, touching straight below the tool at 10 mm from the spindle axis.
+    fn path(heights: &[Option<f64>]) -> ToolPath {
+        let touch = |h: &Option<f64>| {
+            h.map(|height| Touch {
+                height,
+                contact: [0.0, 6.0, 8.0],
+            })
+        };
+        ToolPath {
+            trajectory: Trajectory {
+                kind: MotionKind::Helix,
+                from: -1.0,
+                step: 4.0,
+                points_per_revolution: 4,
+                positions: heights.len() as u64,
+            },
+            touches: heights.iter().map(touch).collect(),
+        }
+    }
+
+    fn text(path: &ToolPath, heading: &Heading) -> String {
+        let mut out = Vec::new();
+        let stations = bridged(&path.touches).expect("contact");
+        write(path, &stations, PROGRAM, heading, &mut out).expect("memory");
+        String::from_utf8(out).expect("ASCII")
+    }
+
+    #[test]
+    fn a_short_program() {
+        let path = path(&[Some(50.0), Some(50.123_456), Some(-0.000_01)]);
+        let expected = "\
+%
+(part: last.step)
+(units: mm and degrees)
+(X: travel along the spindle axis; Y: attack axis, to the tool centre; A: turn of the part about X, right-handed)
+(X0 is the part's, Y0 is the spindle axis; under G93 F is 1/min)
+(start the cutter before this program: it starts no spindle and changes no tool)
+G21 G90 G17 G40 G49 G80 G94
+G64 P0.01
+G0 Y55.1235
+G0 X-1 A0
+G1 Y50 F1000
+G93
+G1 X0 Y50.1235 A90 F63.5314
+G1 X1 Y0 A180 F19.0343
+G94
+G0 Y55.1235
+M2
+%
+";
+        assert_eq!(text(&path, &[("part", "last.step")]), expected);
+    }
+
+    #[test]
+    fn gaps_are_bridged_at_the_higher_side() {
+        let path = path(&[
+            None,
+            Some(3.0),
+            None,
+            None,
+            Some(7.0),
+            None,
+            Some(5.0),
+            None,
+        ]);
+        let heights: Vec<f64> = bridged(&path.touches)
+            .expect("contact")
+            .iter()
+            .map(|s| s.height)
+            .collect();
+        assert_eq!(heights, [3.0, 3.0, 7.0, 7.0, 7.0, 7.0, 5.0, 5.0]);
+    }
+
+    #[test]
+    fn a_path_without_contact_is_an_error() {
+        let dir = tempfile::tempdir().expect("scratch");
+        let file = dir.path().join("path.ngc");
+        for heights in [&[None, None][..], &[]] {
+            let saved = save(&file, &path(heights), PROGRAM, &[]);
+            assert!(matches!(saved, Err(Error::NoContact { .. })));
+        }
+        assert!(!file.exists());
+    }
+
+    #[test]
+    fn comments_are_harmless() {
+        let part = format!("a(b)c\n%\u{e9} {}", "long ".repeat(100));
+        let text = text(&path(&[Some(1.0)]), &[("part", &part)]);
+        let comment = text.lines().nth(1).expect("heading");
+        assert!(comment.starts_with("(part: a[b]c?%? long"), "{comment}");
+        assert!(text.is_ascii() && text.lines().all(|l| l.len() < 252));
+    }
+
+    #[test]
+    fn feeds_keep_six_digits_and_are_never_zero() {
+        for (feed, expected) in [
+            (1.0e7, " F10000000\n"),
+            (1234.5678, " F1234.57\n"),
+            (0.000_123_456_789, " F0.000123457\n"),
+            (1.0e-30, " F0.000000000001\n"),
+            (1.0, " F1\n"),
+        ] {
+            let mut text = String::new();
+            feed_word(&mut text, feed);
+            assert_eq!(text, expected);
+        }
+    }
+}

@@ -1,1 +1,434 @@
-//! To be written.
+//! Jobs in: `job.toml`, what was typed, becomes a [`JobFile`], what it means.
+//!
+//! A job that exists is valid: every number has been checked against its bounds, by the core where
+//! the core has an opinion. Flags and `HORMA_*` variables come in as [`Overrides`] and take the
+//! place of what the file says. An error names the file, the line and the key, and what would be
+//! right. Nothing is read here but the job itself; the part's files are only named.
+
+mod echo;
+mod place;
+mod raw;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use horma_core::{
+    Axis, Contact, Cutter, Discretization, Job, Method, Motion, MotionKind, Point, unit,
+};
+
+pub use self::place::Place;
+use self::raw::{At, Given, RawAxis, RawCutter, RawJob};
+use crate::error::{Error, Result};
+
+/// Chordal tolerance of a job that does not say, mm.
+pub const DEFAULT_TOLERANCE: f64 = 0.01;
+/// Feed of a job that does not say, mm/min.
+pub const DEFAULT_FEED: f64 = 2000.0;
+/// Clearance of a job that does not say, mm.
+pub const DEFAULT_CLEARANCE: f64 = 20.0;
+/// Most workers that a job can ask for.
+pub const MAX_WORKERS: u32 = 10_000;
+
+/// A job, with everything that it leaves open filled in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JobFile {
+    /// The part's files; relative ones start from the job file's folder.
+    pub files: Vec<PathBuf>,
+    /// The spindle, in file coordinates.
+    pub axis: Axis,
+    /// What to compute.
+    pub job: Job,
+    /// Where to compute it.
+    pub cluster: Cluster,
+    /// How to run it on the machine.
+    pub program: Program,
+}
+
+/// Where a job is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cluster {
+    /// Worker processes; 0 computes in this one.
+    pub workers: u32,
+    /// How they get the part.
+    pub distribution: Distribution,
+}
+
+/// How the workers of a cluster get the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Distribution {
+    /// The master sends each worker its rows and those of its neighbours that its cutter reaches.
+    Overlap,
+}
+
+/// How the path is run on the machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Program {
+    /// Feed at the contact, mm/min.
+    pub feed: f64,
+    /// How far above the highest position the cutter retracts, mm.
+    pub clearance: f64,
+}
+
+/// What flags and environment variables put in the place of the job file's values.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Overrides {
+    /// `cluster.workers`
+    pub workers: Option<u32>,
+    /// `cluster.distribution`
+    pub distribution: Option<String>,
+    /// `digitizing.contact`
+    pub contact: Option<String>,
+    /// `digitizing.method`
+    pub method: Option<String>,
+    /// `discretization.tolerance`, mm; it also takes the place of a grid.
+    pub tolerance: Option<f64>,
+    /// `motion.step`, mm
+    pub step: Option<f64>,
+    /// `motion.points_per_revolution`
+    pub points_per_revolution: Option<u32>,
+    /// `motion.from`, mm
+    pub from: Option<f64>,
+    /// `motion.to`, mm
+    pub to: Option<f64>,
+    /// `program.feed`, mm/min
+    pub feed: Option<f64>,
+    /// `program.clearance`, mm
+    pub clearance: Option<f64>,
+}
+
+/// Reads the job file at `path`.
+///
+/// # Errors
+/// [`Error::Io`], and those of [`parse`].
+pub fn read(path: &Path, overrides: &Overrides) -> Result<JobFile> {
+    let text = fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
+    parse(&text, path, overrides)
+}
+
+/// Parses the text of the job file at `path`.
+///
+/// # Errors
+/// [`Error::Job`], with the place of what is wrong.
+pub fn parse(text: &str, path: &Path, overrides: &Overrides) -> Result<JobFile> {
+    let source = Source { text, path };
+    let mut raw: RawJob = toml::from_str(text).map_err(|e| {
+        let at = e.span().map(At::File);
+        source.wrong(at.as_ref(), reworded(e.message()))
+    })?;
+    raw.replace(overrides);
+    let (files, axis) = source.part(&raw)?;
+    let job = Job {
+        discretization: source.discretization(&raw)?,
+        cutter: source.cutter(&raw)?,
+        motion: source.motion(&raw)?,
+        contact: source.choose(
+            raw.digitizing.contact.as_ref(),
+            "contact",
+            Contact::Facet,
+            &CONTACTS,
+        )?,
+        method: source.choose(
+            raw.digitizing.method.as_ref(),
+            "method",
+            Method::Exact,
+            &METHODS,
+        )?,
+    };
+    let checked = job.discretization.validate().and(job.motion.validate());
+    checked.map_err(|e| source.core(&raw, e))?;
+    Ok(JobFile {
+        files,
+        axis,
+        job,
+        cluster: source.cluster(&raw)?,
+        program: source.program(&raw)?,
+    })
+}
+
+const KINDS: [(&str, MotionKind); 2] = [("helix", MotionKind::Helix), ("rings", MotionKind::Rings)];
+const CONTACTS: [(&str, Contact); 2] = [("facet", Contact::Facet), ("point", Contact::Point)];
+const METHODS: [(&str, Method); 2] = [("exact", Method::Exact), ("brute", Method::Brute)];
+const DISTRIBUTIONS: [(&str, Distribution); 1] = [("overlap", Distribution::Overlap)];
+
+/// The wheels, each with its keys.
+const CUTTERS: [(&str, &[&str]); 4] = [
+    ("torus", &["major_radius", "minor_radius"]),
+    ("ball", &["radius"]),
+    ("cylinder", &["radius", "width"]),
+    ("cone", &["radius", "width", "half_angle"]),
+];
+
+/// The text that errors point into.
+struct Source<'a> {
+    text: &'a str,
+    path: &'a Path,
+}
+
+impl Source<'_> {
+    fn part(&self, raw: &RawJob) -> Result<(Vec<PathBuf>, Axis)> {
+        let Some(part) = &raw.part else {
+            let what = "there is no [part]; say what to machine, as in files = [\"last.step\"]";
+            return Err(self.wrong(None, what));
+        };
+        let files = self.required(
+            part,
+            part.value.files.as_ref(),
+            "part",
+            "files = [\"last.step\"]",
+        )?;
+        let files_at = part.value.files.as_ref().map(|f| &f.at);
+        if files.is_empty() || files.iter().any(|f| f.as_os_str().is_empty()) {
+            let what = "files must name at least one file, as in files = [\"last.step\"]";
+            return Err(self.wrong(files_at, what));
+        }
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let files = files.iter().map(|f| folder.join(f)).collect();
+        let axis = part.value.axis.as_ref();
+        Ok((files, axis.map_or(Ok(Axis::default()), |a| self.axis(a))?))
+    }
+
+    fn axis(&self, given: &Given<toml::Value>) -> Result<Axis> {
+        const FORM: &str = "axis must be \"auto\" or { point = [x, y, z], direction = [x, y, z] }";
+        if given.value.as_str() == Some("auto") {
+            return Ok(Axis::Principal);
+        }
+        let wrong = |what: String| self.wrong(Some(&given.at), what);
+        let raw: RawAxis = given
+            .value
+            .clone()
+            .try_into()
+            .map_err(|e: toml::de::Error| wrong(format!("{FORM}: {}", reworded(e.message()))))?;
+        let point: Point = raw.point.unwrap_or_default();
+        let direction = raw.direction.unwrap_or([1.0, 0.0, 0.0]);
+        if let Some(c) = point.into_iter().find(|c| !c.is_finite()) {
+            return Err(wrong(format!(
+                "axis.point has the coordinate {c}, but must be finite"
+            )));
+        }
+        if unit(direction).is_none() {
+            return Err(wrong(
+                horma_core::Error::NoDirection { direction }.to_string(),
+            ));
+        }
+        Ok(Axis::Through { point, direction })
+    }
+
+    fn discretization(&self, raw: &RawJob) -> Result<Discretization> {
+        let raw = &raw.discretization;
+        match (&raw.tolerance, &raw.grid) {
+            (None, None) => Ok(Discretization::Tolerance(DEFAULT_TOLERANCE)),
+            (Some(tolerance), None) => Ok(Discretization::Tolerance(tolerance.value)),
+            (None, Some(grid)) => Ok(Discretization::Grid {
+                rows: self.count(&grid.value.rows, "rows")?,
+                columns: self.count(&grid.value.columns, "columns")?,
+            }),
+            (Some(_), Some(grid)) => {
+                let what = "tolerance and grid are both given, but only one of them can hold";
+                Err(self.wrong(Some(&grid.at), what))
+            }
+        }
+    }
+
+    fn cutter(&self, raw: &RawJob) -> Result<Cutter> {
+        let Some(section) = &raw.cutter else {
+            let what = "there is no [cutter]; say which wheel cuts, as in kind = \"torus\", \
+                major_radius = 40, minor_radius = 8";
+            return Err(self.wrong(None, what));
+        };
+        let cutter = &section.value;
+        self.required(section, cutter.kind.as_ref(), "cutter", "kind = \"torus\"")?;
+        let (kind, keys) = self.choose(
+            cutter.kind.as_ref(),
+            "cutter",
+            CUTTERS[0],
+            &CUTTERS.map(|c| (c.0, c)),
+        )?;
+        for (key, value) in cutter.dimensions() {
+            if let Some(value) = value
+                && !keys.contains(&key)
+            {
+                let keys = keys.join(", ");
+                let what = format!("{key} does not belong to a {kind}, which has {keys}");
+                return Err(self.wrong(Some(&value.at), what));
+            }
+        }
+        let get = |key: &'static str| self.dimension(section, kind, key);
+        let cutter = match kind {
+            "torus" => Cutter::torus(get("major_radius")?, get("minor_radius")?),
+            "ball" => Cutter::ball(get("radius")?),
+            "cylinder" => Cutter::cylinder(get("radius")?, get("width")?),
+            _ => Cutter::cone(get("radius")?, get("width")?, get("half_angle")?),
+        };
+        cutter.map_err(|e| self.core(raw, e))
+    }
+
+    fn dimension(&self, section: &Given<RawCutter>, kind: &str, key: &str) -> Result<f64> {
+        let mut all = section.value.dimensions().into_iter();
+        let value = all.find_map(|(k, v)| v.filter(|_| k == key));
+        value.map(|v| v.value).ok_or_else(|| {
+            let angle = key == "half_angle";
+            let unit = if angle { "degrees" } else { "mm" };
+            self.wrong(
+                Some(&section.at),
+                format!("a {kind} needs {key}, in {unit}"),
+            )
+        })
+    }
+
+    fn motion(&self, raw: &RawJob) -> Result<Motion> {
+        let Some(section) = &raw.motion else {
+            let what = "there is no [motion]; say how the cutter travels, as in step = 2.0, \
+                points_per_revolution = 360";
+            return Err(self.wrong(None, what));
+        };
+        let motion = &section.value;
+        let step = self.required(section, motion.step.as_ref(), "motion", "step = 2.0")?;
+        let points = motion.points_per_revolution.as_ref();
+        self.required(section, points, "motion", "points_per_revolution = 360")?;
+        let points = points.map(|p| self.count(p, "points_per_revolution"));
+        Ok(Motion {
+            kind: self.choose(motion.kind.as_ref(), "motion", MotionKind::Helix, &KINDS)?,
+            step: *step,
+            points_per_revolution: points.transpose()?.unwrap_or_default(),
+            from: motion.from.as_ref().map(|g| g.value),
+            to: motion.to.as_ref().map(|g| g.value),
+        })
+    }
+
+    fn cluster(&self, raw: &RawJob) -> Result<Cluster> {
+        let raw = &raw.cluster;
+        let workers = raw.workers.as_ref();
+        let workers = workers.map_or(Ok(0), |w| self.count(w, "workers"))?;
+        if workers > MAX_WORKERS {
+            let what = format!("workers is {workers}, but must be at most {MAX_WORKERS}");
+            return Err(self.wrong(raw.workers.as_ref().map(|w| &w.at), what));
+        }
+        Ok(Cluster {
+            workers,
+            distribution: self.choose(
+                raw.distribution.as_ref(),
+                "distribution",
+                Distribution::Overlap,
+                &DISTRIBUTIONS,
+            )?,
+        })
+    }
+
+    fn program(&self, raw: &RawJob) -> Result<Program> {
+        let raw = &raw.program;
+        let number =
+            |given: &Option<Given<f64>>, key, default, least: &str, ok: fn(f64) -> bool| {
+                let Some(given) = given else {
+                    return Ok(default);
+                };
+                if given.value.is_finite() && ok(given.value) {
+                    return Ok(given.value);
+                }
+                let what = format!("{key} is {}, but must be {least}", given.value);
+                Err(self.wrong(Some(&given.at), what))
+            };
+        Ok(Program {
+            feed: number(
+                &raw.feed,
+                "feed",
+                DEFAULT_FEED,
+                "greater than 0 mm/min",
+                |v| v > 0.0,
+            )?,
+            clearance: number(
+                &raw.clearance,
+                "clearance",
+                DEFAULT_CLEARANCE,
+                "at least 0 mm",
+                |v| v >= 0.0,
+            )?,
+        })
+    }
+
+    fn required<'v, S, T>(
+        &self,
+        section: &Given<S>,
+        value: Option<&'v Given<T>>,
+        name: &str,
+        example: &str,
+    ) -> Result<&'v T> {
+        value.map(|g| &g.value).ok_or_else(|| {
+            let key = example.split(' ').next().unwrap_or_default();
+            let what = format!("[{name}] has no {key}; give one, as in {example}");
+            self.wrong(Some(&section.at), what)
+        })
+    }
+
+    /// A number of things.
+    fn count(&self, given: &Given<i64>, key: &str) -> Result<u32> {
+        u32::try_from(given.value).map_err(|_| {
+            let most = u32::MAX;
+            let what = format!("{key} is {}, but must be from 0 to {most}", given.value);
+            self.wrong(Some(&given.at), what)
+        })
+    }
+
+    /// The one of `known` that is named, or the default.
+    fn choose<T: Copy>(
+        &self,
+        given: Option<&Given<String>>,
+        what: &str,
+        default: T,
+        known: &[(&str, T)],
+    ) -> Result<T> {
+        let Some(given) = given else {
+            return Ok(default);
+        };
+        let found = known.iter().find(|(name, _)| *name == given.value);
+        found.map(|&(_, value)| value).ok_or_else(|| {
+            let known = known.iter().map(|(name, _)| *name).collect::<Vec<_>>();
+            let what = format!(
+                "unknown {what} '{}'; known: {}",
+                given.value,
+                known.join(", ")
+            );
+            self.wrong(Some(&given.at), what)
+        })
+    }
+
+    /// What the core refuses, at the key that it is about.
+    fn core(&self, raw: &RawJob, error: horma_core::Error) -> Error {
+        let key = match &error {
+            horma_core::Error::OutOfBounds { quantity, .. } => quantity,
+            horma_core::Error::ConeTooSteep { .. } => "half_angle",
+            horma_core::Error::EmptyTravel { .. } => "to",
+            _ => return Error::Core(error),
+        };
+        self.wrong(raw.at(key), error.to_string())
+    }
+
+    fn wrong(&self, at: Option<&At>, what: impl Into<String>) -> Error {
+        let place = match at {
+            None => Place::File(self.path.to_owned()),
+            Some(At::Flag(key)) => Place::Flag(key),
+            Some(At::File(span)) => Place::of(self.path, self.text, span),
+        };
+        Error::Job {
+            what: what.into(),
+            place: Box::new(place),
+        }
+    }
+}
+
+/// The parser's message in the words of a job file.
+fn reworded(message: &str) -> String {
+    let mut message = message.trim_end().replace('\n', ", ");
+    for (theirs, ours) in [
+        ("expected f64", "expected a number"),
+        ("expected i64", "expected a whole number"),
+        ("expected a sequence", "expected a list"),
+        ("unknown field", "unknown key"),
+        ("missing field", "missing key"),
+    ] {
+        message = message.replace(theirs, ours);
+    }
+    message
+}
+
+#[cfg(test)]
+mod tests;

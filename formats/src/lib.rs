@@ -7,7 +7,12 @@ mod error;
 pub mod job;
 pub mod part;
 
+pub mod inspect;
+
 pub mod sample;
+pub mod step_out;
+
+pub mod output;
 
 pub mod csv;
 pub mod gcode;

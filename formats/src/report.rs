@@ -1,1 +1,141 @@
-//! To be written.
+//! `report.json`: what was computed, out of what, by whom and how fast.
+//!
+//! Figures are taken as they come from the run's record; nothing is measured here.
+
+use std::io::Write;
+use std::path::Path;
+
+use horma_core::{Record, ToolPath};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::error::Result;
+use crate::output;
+
+/// A run's report.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// Version of horma that wrote it.
+    pub version: String,
+    /// The job in effect, keyed as a job file is.
+    pub job: Value,
+    /// What the machinist should know, such as the open edges of a mesh.
+    pub warnings: Vec<String>,
+    /// The path.
+    pub path: PathStatistics,
+    /// Phases, bodies, counters, workers, extents and lost attempts, each under its own key.
+    #[serde(flatten)]
+    pub record: Record,
+}
+
+/// A path in figures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PathStatistics {
+    /// Number of positions.
+    pub positions: u64,
+    /// Positions where the cutter touches the part.
+    pub with_contact: u64,
+    /// Positions where nothing is in its reach.
+    pub without_contact: u64,
+    /// Lowest tool centre, mm; nothing without any contact.
+    pub lowest: Option<f64>,
+    /// Highest tool centre, mm; nothing without any contact.
+    pub highest: Option<f64>,
+}
+
+impl PathStatistics {
+    /// Counts over a path.
+    pub fn of(path: &ToolPath) -> Self {
+        let heights = || path.touches.iter().flatten().map(|t| t.height);
+        let positions = path.touches.len() as u64;
+        let with_contact = heights().count() as u64;
+        Self {
+            positions,
+            with_contact,
+            without_contact: positions - with_contact,
+            lowest: heights().reduce(f64::min),
+            highest: heights().reduce(f64::max),
+        }
+    }
+}
+
+/// Writes `report` to `file`: beside it first, then renamed.
+///
+/// # Errors
+/// [`crate::Error::Io`] if the file cannot be written.
+pub fn save(file: &Path, report: &Report) -> Result<()> {
+    output::write(file, |out| {
+        serde_json::to_writer_pretty(&mut *out, report)?;
+        out.write_all(b"\n")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use horma_core::{LostAttempt, MotionKind, Phase, Touch, Trajectory};
+
+    use super::*;
+
+    fn path() -> ToolPath {
+        let touch = |height| Touch {
+            height,
+            contact: [0.0; 3],
+        };
+        ToolPath {
+            trajectory: Trajectory {
+                kind: MotionKind::Rings,
+                from: 0.0,
+                step: 1.0,
+                points_per_revolution: 3,
+                positions: 3,
+            },
+            touches: vec![Some(touch(2.5)), None, Some(touch(-1.0))],
+        }
+    }
+
+    #[test]
+    fn a_path_is_counted() {
+        let counted = PathStatistics::of(&path());
+        assert_eq!((counted.with_contact, counted.without_contact), (2, 1));
+        assert_eq!((counted.lowest, counted.highest), (Some(-1.0), Some(2.5)));
+        let nothing = PathStatistics::of(&ToolPath {
+            touches: vec![None],
+            ..path()
+        });
+        assert_eq!((nothing.lowest, nothing.highest), (None, None));
+    }
+
+    #[test]
+    fn a_report_reads_back() {
+        let dir = tempfile::tempdir().expect("scratch");
+        let file = dir.path().join(output::REPORT);
+        let report = Report {
+            version: "0.1.0".to_owned(),
+            job: serde_json::json!({ "cutter": { "kind": "ball", "radius": 5.0 } }),
+            warnings: vec!["last.stl: 3 edges are open".to_owned()],
+            path: PathStatistics::of(&path()),
+            record: Record {
+                phases: vec![Phase {
+                    name: "digitize".to_owned(),
+                    seconds: 0.1 + 0.2,
+                }],
+                lost: vec![LostAttempt {
+                    extent: 1,
+                    attempt: 1,
+                    worker: "w2".to_owned(),
+                    positions_received: 100,
+                    positions: 250,
+                    reason: "connection reset".to_owned(),
+                }],
+                ..Record::default()
+            },
+        };
+        save(&file, &report).expect("writable");
+        let text = std::fs::read_to_string(&file).expect("there");
+        let value: Value = serde_json::from_str(&text).expect("JSON");
+        assert_eq!(value["lost"][0]["positions_received"], 100);
+        assert_eq!(value["path"]["with_contact"], 2);
+        let back: Report = serde_json::from_value(value).expect("own format");
+        assert_eq!(back, report);
+    }
+}

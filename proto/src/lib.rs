@@ -1,1 +1,29 @@
-//! The cluster's wire protocol: generated types and their conversions to and from the core.
+//! The cluster's wire protocol.
+//!
+//! `cluster.proto` is the contract; [`wire`] is what is generated from it, [`convert`] takes it to
+//! and from the core's valid types, [`chunk`] cuts what is large. Whatever arrives is checked here:
+//! past this crate a value is as valid as one made in this process. This crate opens no connection.
+
+mod chunk;
+mod convert;
+mod error;
+mod task;
+
+/// The generated types and services. They stay at the edges: everything else uses the core's types.
+#[allow(missing_docs, unused_qualifications, clippy::all, clippy::pedantic)]
+#[allow(clippy::needless_pass_by_value, clippy::semicolon_if_nothing_returned)]
+pub mod wire {
+    tonic::include_proto!("horma.cluster.v1");
+}
+
+pub use chunk::{CHUNK_BYTES, Chunks, Messages, POSITION_BYTES, pack_positions, unpack_positions};
+pub use convert::{body_from_wire, body_to_wire, job_from_wire, job_to_wire};
+pub use convert::{row_from_wire, row_to_wire, trajectory_from_wire, trajectory_to_wire};
+pub use error::{Error, Result};
+pub use task::TaskId;
+
+/// The version that both ends of a connection must share.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Greatest size of any single message, bytes: a chunk and what surrounds it.
+pub const MAX_MESSAGE: usize = 4 * CHUNK_BYTES;

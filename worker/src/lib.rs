@@ -1,1 +1,96 @@
-//! One digitizing worker.
+//! One digitizing worker: it makes itself known to the master, and digitizes what it is sent.
+//!
+//! A worker keeps nothing between tasks, so it may be killed at any time. It never decides what to
+//! compute, never opens a file, and never talks to a client.
+
+mod error;
+mod membership;
+mod service;
+
+use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::time::Duration;
+
+use horma_proto::MAX_MESSAGE;
+use horma_proto::wire::worker_server::WorkerServer;
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+use tonic::transport::Server;
+use tonic::transport::server::TcpIncoming;
+use tracing::info;
+
+pub use error::{Error, Result};
+
+/// What a worker has to know.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// The master, `host:port`.
+    pub master: String,
+    /// Name of this worker, the same after a restart.
+    pub id: String,
+    /// A number that differs from one start to the next.
+    pub incarnation: u64,
+    /// `host:port` at which the master reaches this worker; by default the listener's port at the
+    /// address that the way to the master leaves from.
+    pub advertise: Option<String>,
+    /// Threads to digitize with.
+    pub threads: usize,
+    /// How long to look for the master, at first and again when it has gone.
+    pub patience: Duration,
+}
+
+/// How long open tasks may take to notice a shutdown.
+const DRAIN: Duration = Duration::from_secs(5);
+
+/// Serves on `listener` until `shutdown`, or until the master has been gone for too long.
+///
+/// # Errors
+/// [`Error::NoMaster`] if the master never answered, [`Error::Refused`] if it did not want this
+/// worker, and errors of the operating system.
+pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationToken) -> Result<()> {
+    let bound = listener.local_addr().map_err(Error::Listener)?;
+    let address = match &config.advertise {
+        Some(address) => address.clone(),
+        None => reachable(bound, &config.master).to_string(),
+    };
+    info!(worker = config.id, %bound, address, "listening");
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(config.threads)
+        .build()
+        .map_err(Error::Threads)?;
+    let service = service::Service::new(pool, shutdown.clone());
+    let service = WorkerServer::new(service)
+        .max_decoding_message_size(MAX_MESSAGE)
+        .max_encoding_message_size(MAX_MESSAGE);
+    let serving = Server::builder()
+        .http2_keepalive_interval(Some(Duration::from_secs(5)))
+        .http2_keepalive_timeout(Some(Duration::from_secs(10)))
+        .add_service(service)
+        .serve_with_incoming_shutdown(
+            TcpIncoming::from(listener).with_nodelay(Some(true)),
+            shutdown.clone().cancelled_owned(),
+        );
+    let serving = tokio::spawn(serving);
+    let outcome = membership::keep(&config, &address, &shutdown).await;
+    // Membership is what a worker lives for: without it there is nobody to serve.
+    shutdown.cancel();
+    // A task that does not notice is abandoned: the master gives its extent to another.
+    if let Ok(Ok(served)) = tokio::time::timeout(DRAIN, serving).await {
+        served.map_err(Error::Serve)?;
+    }
+    outcome
+}
+
+/// The listener's address as others see it: a listener on every interface is reached at the one
+/// that leads to the master.
+fn reachable(bound: SocketAddr, master: &str) -> SocketAddr {
+    if !bound.ip().is_unspecified() {
+        return bound;
+    }
+    // Connecting a datagram socket sends nothing; it only asks the system for a route.
+    let any: IpAddr = bound.ip();
+    let towards = UdpSocket::bind((any, 0)).and_then(|socket| {
+        socket.connect(master)?;
+        socket.local_addr()
+    });
+    towards.map_or(bound, |local| SocketAddr::new(local.ip(), bound.port()))
+}

@@ -1,0 +1,257 @@
+//! What can be typed.
+
+use std::io::stdout;
+use std::path::PathBuf;
+
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+use horma_formats::job::Overrides;
+
+const AFTER_HELP: &str = "\
+Start with:
+  horma init demo                       a sample last, its holders and a job
+  horma run demo/job.toml -o out        digitize it in this process
+  horma run demo/job.toml -o out -w 2   the same on two worker processes: the same bytes
+
+Across machines:
+  horma master --bind 10.0.0.1:7171 --insecure       on one
+  horma worker --master 10.0.0.1:7171 --bind 0.0.0.0:0 --insecure   on every other
+  horma submit job.toml --master 10.0.0.1:7171 -o out
+
+Lengths are in mm, angles in degrees. Flags go over HORMA_* variables, these over the job file.
+
+Exit codes: 0 done, 2 the input is wrong, 3 the job cannot be done, 4 the cluster failed,
+130 interrupted.";
+
+/// Tool paths for shoe lasts and other free-form parts turned on copying lathes.
+///
+/// For each position of a spiral around the part, horma finds where the cutter first touches it: the
+/// exact tool centre, never deeper. It runs in one process or on a cluster of workers, with the same
+/// result to the last bit.
+#[derive(Debug, Parser)]
+#[command(name = "horma", version, after_help = AFTER_HELP)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+    /// What to log to standard error: error, warn, info, debug, or a tracing filter
+    #[arg(
+        long,
+        global = true,
+        value_name = "FILTER",
+        env = "HORMA_LOG",
+        default_value = "error"
+    )]
+    pub log: String,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Compute the tool path of a job, here or on local workers
+    Run(Run),
+    /// Send a job to a running master, and fetch its path
+    Submit(Submit),
+    /// Serve as a master: workers register, clients submit jobs
+    Master(Master),
+    /// Serve as a worker of a master
+    Worker(Worker),
+    /// Write a sample job with a shoe last and its holders
+    Init {
+        /// Where to write; created if missing
+        directory: PathBuf,
+    },
+    /// Tell what is in part files
+    Inspect {
+        /// STEP, STL or OBJ files
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+    },
+    /// Print shell completions
+    Completions {
+        /// bash, zsh, fish, elvish or powershell
+        shell: Shell,
+    },
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Run {
+    #[command(flatten)]
+    pub job: Job,
+    /// Worker processes on this machine; 0 computes in this process
+    #[arg(short, long, value_name = "N", env = "HORMA_WORKERS")]
+    pub workers: Option<u32>,
+    /// Threads in this process [default: all cores], or in each local worker [default: 1]
+    #[arg(long, value_name = "N", env = "HORMA_THREADS", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Submit {
+    #[command(flatten)]
+    pub job: Job,
+    /// Where the master listens
+    #[arg(long, value_name = "HOST:PORT", env = "HORMA_MASTER")]
+    pub master: String,
+}
+
+/// A job, where its results go, and what it says differently this time.
+#[derive(Debug, Args)]
+pub(crate) struct Job {
+    /// The job file (TOML)
+    #[arg(value_name = "JOB")]
+    pub file: PathBuf,
+    /// Directory for path.csv, path.ngc, report.json and preview.png
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Show nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// What the cutter touches: facet or point
+    #[arg(
+        long,
+        env = "HORMA_CONTACT",
+        help_heading = "Instead of the job file's"
+    )]
+    pub contact: Option<String>,
+    /// How the touch is searched: exact or brute
+    #[arg(long, env = "HORMA_METHOD", help_heading = "Instead of the job file's")]
+    pub method: Option<String>,
+    /// Chordal tolerance of surfaces, mm
+    #[arg(
+        long,
+        value_name = "MM",
+        env = "HORMA_TOLERANCE",
+        help_heading = "Instead of the job file's"
+    )]
+    pub tolerance: Option<f64>,
+    /// Travel per revolution, mm
+    #[arg(
+        long,
+        value_name = "MM",
+        env = "HORMA_STEP",
+        help_heading = "Instead of the job file's"
+    )]
+    pub step: Option<f64>,
+    /// Positions per revolution
+    #[arg(
+        long,
+        value_name = "N",
+        env = "HORMA_POINTS_PER_REVOLUTION",
+        help_heading = "Instead of the job file's"
+    )]
+    pub points_per_revolution: Option<u32>,
+    /// First travel, mm
+    #[arg(
+        long,
+        value_name = "MM",
+        env = "HORMA_FROM",
+        allow_negative_numbers = true,
+        help_heading = "Instead of the job file's"
+    )]
+    pub from: Option<f64>,
+    /// Last travel, mm
+    #[arg(
+        long,
+        value_name = "MM",
+        env = "HORMA_TO",
+        allow_negative_numbers = true,
+        help_heading = "Instead of the job file's"
+    )]
+    pub to: Option<f64>,
+    /// Feed at the contact, mm/min
+    #[arg(
+        long,
+        value_name = "MM/MIN",
+        env = "HORMA_FEED",
+        help_heading = "Instead of the job file's"
+    )]
+    pub feed: Option<f64>,
+    /// How the part reaches the workers: overlap
+    #[arg(
+        long,
+        env = "HORMA_DISTRIBUTION",
+        help_heading = "Instead of the job file's"
+    )]
+    pub distribution: Option<String>,
+}
+
+impl Job {
+    /// What goes over the job file.
+    pub fn overrides(&self, workers: Option<u32>) -> Overrides {
+        Overrides {
+            workers,
+            distribution: self.distribution.clone(),
+            contact: self.contact.clone(),
+            method: self.method.clone(),
+            tolerance: self.tolerance,
+            step: self.step,
+            points_per_revolution: self.points_per_revolution,
+            from: self.from,
+            to: self.to,
+            feed: self.feed,
+            clearance: None,
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Master {
+    /// Where to listen; port 0 takes any free one. The address is printed once it is bound
+    #[arg(
+        long,
+        value_name = "HOST:PORT",
+        env = "HORMA_BIND",
+        default_value = "127.0.0.1:7171"
+    )]
+    pub bind: String,
+    /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated
+    #[arg(long)]
+    pub insecure: bool,
+    /// After how long a silence a worker counts as lost, seconds
+    #[arg(long, value_name = "S", env = "HORMA_LEASE", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
+    pub lease: u64,
+    /// How long a job waits for workers when there is none, seconds
+    #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
+    pub patience: u64,
+    /// Largest part that a client may send, MB
+    #[arg(
+        long,
+        value_name = "MB",
+        env = "HORMA_MAX_PART",
+        default_value_t = 1024
+    )]
+    pub max_part: u64,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Worker {
+    /// Where the master listens
+    #[arg(long, value_name = "HOST:PORT", env = "HORMA_MASTER")]
+    pub master: String,
+    /// Where to listen; port 0 takes any free one
+    #[arg(
+        long,
+        value_name = "HOST:PORT",
+        env = "HORMA_BIND",
+        default_value = "127.0.0.1:0"
+    )]
+    pub bind: String,
+    /// Address at which others reach this worker [default: the one that leads to the master]
+    #[arg(long, value_name = "HOST:PORT", env = "HORMA_ADVERTISE")]
+    pub advertise: Option<String>,
+    /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated
+    #[arg(long)]
+    pub insecure: bool,
+    /// Name of this worker, the same after a restart [default: host name and process number]
+    #[arg(long, env = "HORMA_WORKER_ID")]
+    pub id: Option<String>,
+    /// Threads to digitize with [default: all cores]
+    #[arg(long, value_name = "N", env = "HORMA_THREADS", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// How long to look for a master that is not there, or not there any more, seconds
+    #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
+    pub patience: u64,
+}
+
+pub(crate) fn print_completions(shell: Shell) {
+    clap_complete::generate(shell, &mut Arguments::command(), "horma", &mut stdout());
+}

@@ -1,0 +1,90 @@
+//! Why a command ends, and its exit code.
+
+use std::path::PathBuf;
+
+/// Everything that ends a command early.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Error {
+    #[error(transparent)]
+    Formats(#[from] horma_formats::Error),
+    #[error(transparent)]
+    Core(#[from] horma_core::Error),
+    #[error(transparent)]
+    Master(#[from] horma_master::Error),
+    #[error(transparent)]
+    Worker(#[from] horma_worker::Error),
+    #[error("cannot listen on {address}: {source}; choose another port, or 0 for any free one")]
+    Bind {
+        address: String,
+        source: std::io::Error,
+    },
+    #[error(
+        "{address} is reachable from other machines, and traffic is neither encrypted nor authenticated; add --insecure if you trust that network"
+    )]
+    Exposed { address: String },
+    #[error("cannot start a worker from {}: {source}", program.display())]
+    Spawn {
+        program: PathBuf,
+        source: std::io::Error,
+    },
+    #[error("local worker {id} ended with {status} before it registered")]
+    WorkerEnded {
+        id: String,
+        status: std::process::ExitStatus,
+    },
+    #[error("no master answers at {address} ({reason}); is it running, and reachable from here")]
+    NoMaster { address: String, reason: String },
+    #[error("{address:?} is not an address of the form host:port")]
+    Address { address: String },
+    #[error("the master at {address} refused the job: {reason}")]
+    Refused { address: String, reason: String },
+    #[error("the master at {address} could not do the job: {reason}")]
+    JobFailed { address: String, reason: String },
+    #[error("the master at {address} sent a path that cannot be right: {reason}")]
+    BadReply { address: String, reason: String },
+    #[error("cannot start threads: {0}")]
+    Threads(String),
+    #[error("interrupted")]
+    Interrupted,
+}
+
+pub(crate) type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// 2: the input is wrong; 3: the job cannot be done; 4: the cluster failed; 130: interrupted.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Core(e) | Self::Formats(horma_formats::Error::Core(e)) => of_core(e),
+            Self::Formats(horma_formats::Error::NoContact { .. }) => 3,
+            Self::Master(horma_master::Error::Plan(e)) => of_core(e),
+            Self::Formats(_)
+            | Self::Bind { .. }
+            | Self::Exposed { .. }
+            | Self::Address { .. }
+            | Self::Refused { .. }
+            | Self::Worker(horma_worker::Error::Address { .. }) => 2,
+            Self::Master(_)
+            | Self::Worker(_)
+            | Self::Spawn { .. }
+            | Self::WorkerEnded { .. }
+            | Self::NoMaster { .. }
+            | Self::JobFailed { .. }
+            | Self::BadReply { .. }
+            | Self::Threads(_) => 4,
+            Self::Interrupted => 130,
+        }
+    }
+}
+
+/// The mathematics refuses either what it was given or what it would take.
+fn of_core(error: &horma_core::Error) -> u8 {
+    use horma_core::Error as E;
+    match error {
+        E::OutOfMemory { .. }
+        | E::ToleranceNotReached { .. }
+        | E::TooManyPositions { .. }
+        | E::GridTooLarge { .. }
+        | E::EmptyTravel { .. } => 3,
+        _ => 2,
+    }
+}

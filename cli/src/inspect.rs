@@ -1,0 +1,28 @@
+//! The small commands: a sample to start with, and a look into files.
+
+use std::path::{Path, PathBuf};
+
+use horma_formats::{inspect, sample};
+
+use crate::error::Result;
+use crate::say;
+
+/// Tells what is in each file.
+pub(crate) fn inspect(files: &[PathBuf]) -> Result<()> {
+    for file in files {
+        say(&inspect::inspect(file)?.to_string());
+    }
+    Ok(())
+}
+
+/// Writes the sample job.
+pub(crate) fn init(directory: &Path) -> Result<()> {
+    sample::write_sample(directory)?;
+    let job = directory.join("job.toml");
+    say(&format!(
+        "wrote a shoe last, its holders and a job\nnext: horma run {} -o {}",
+        job.display(),
+        directory.join("out").display(),
+    ));
+    Ok(())
+}

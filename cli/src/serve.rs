@@ -1,0 +1,79 @@
+//! The two servers: master and worker.
+
+use std::time::Duration;
+
+use horma_master::Config;
+use tokio::net::TcpListener;
+use tokio::runtime::Runtime;
+use tokio_util::sync::CancellationToken;
+
+use crate::args::{Master, Worker};
+use crate::cluster::bind;
+use crate::error::{Error, Result};
+use crate::{say, system};
+
+/// Serves as a master until it is told to stop.
+pub(crate) fn master(args: &Master) -> Result<()> {
+    let config = Config {
+        heartbeat: Duration::from_secs(args.lease) / 5,
+        lease: Duration::from_secs(args.lease),
+        patience: Duration::from_secs(args.patience),
+        regroup: Duration::from_secs(args.patience),
+        max_part: args.max_part.saturating_mul(1_000_000),
+        memory: system::memory(),
+    };
+    runtime()?.block_on(async {
+        let listener = listen(&args.bind, args.insecure).await?;
+        let shutdown = CancellationToken::new();
+        let (_master, serving) = horma_master::start(listener, config, shutdown.clone());
+        let mut serving = std::pin::pin!(serving);
+        tokio::select! {
+            served = &mut serving => return served.map_or(Ok(()), |s| Ok(s?)),
+            () = system::interrupted() => shutdown.cancel(),
+        }
+        serving.await.map_or(Ok(()), |s| Ok(s?))
+    })
+}
+
+/// Serves as a worker until it is told to stop, or until its master has gone.
+pub(crate) fn worker(args: Worker) -> Result<()> {
+    let config = horma_worker::Config {
+        master: args.master,
+        id: args.id.unwrap_or_else(system::process_name),
+        incarnation: system::incarnation(),
+        advertise: args.advertise,
+        threads: args.threads.map_or_else(system::cores, usize::from),
+        patience: Duration::from_secs(args.patience),
+    };
+    runtime()?.block_on(async {
+        let listener = listen(&args.bind, args.insecure).await?;
+        let shutdown = CancellationToken::new();
+        let stopping = shutdown.clone();
+        tokio::spawn(async move {
+            system::interrupted().await;
+            stopping.cancel();
+        });
+        Ok(horma_worker::run(listener, config, shutdown).await?)
+    })
+}
+
+/// Listens, and prints where: with port 0 nobody could know otherwise.
+async fn listen(address: &str, insecure: bool) -> Result<TcpListener> {
+    let listener = bind(address).await?;
+    let bound = listener.local_addr().map_err(|source| Error::Bind {
+        address: address.to_owned(),
+        source,
+    })?;
+    if !bound.ip().is_loopback() && !insecure {
+        return Err(Error::Exposed {
+            address: bound.to_string(),
+        });
+    }
+    say(&format!("listening on {bound}"));
+    Ok(listener)
+}
+
+/// The runtime of everything that talks to others.
+pub(crate) fn runtime() -> Result<Runtime> {
+    Runtime::new().map_err(|e| Error::Threads(e.to_string()))
+}

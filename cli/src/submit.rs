@@ -1,0 +1,120 @@
+//! A run on a master elsewhere: the part goes out, the path comes back.
+
+use std::time::Duration;
+
+use horma_core::{Job, Part, Record, SubTrajectory, Trajectory, stitch};
+use horma_master::{Outcome, Progress};
+use horma_proto::wire::master_client::MasterClient;
+use horma_proto::wire::submit_reply::Kind as Reply;
+use horma_proto::wire::submit_request::Kind as Request;
+use horma_proto::wire::{SubmitHeader, SubmitRequest};
+use horma_proto::{Chunks, MAX_MESSAGE, VERSION};
+use tonic::transport::Endpoint;
+use tonic::{Code, Status};
+
+use crate::error::{Error, Result};
+
+/// Longest time to connect.
+const CONNECT: Duration = Duration::from_secs(5);
+
+/// How often the connection is tried while the master is silent, and how long that may take.
+const KEEPALIVE: Duration = Duration::from_secs(10);
+
+/// Has a part digitized by the master at `address`.
+pub(crate) async fn run(
+    part: Part,
+    job: Job,
+    address: &str,
+    progress: Progress,
+) -> Result<Outcome> {
+    let bad_address = |_| Error::Address {
+        address: address.to_owned(),
+    };
+    let endpoint = Endpoint::from_shared(format!("http://{address}")).map_err(bad_address)?;
+    let channel = endpoint
+        .connect_timeout(CONNECT)
+        .http2_keep_alive_interval(KEEPALIVE)
+        .keep_alive_timeout(KEEPALIVE)
+        .tcp_nodelay(true)
+        .connect()
+        .await
+        .map_err(|e| Error::NoMaster {
+            address: address.to_owned(),
+            reason: cause(&e),
+        })?;
+    let mut client = MasterClient::new(channel)
+        .max_decoding_message_size(MAX_MESSAGE)
+        .max_encoding_message_size(MAX_MESSAGE);
+
+    progress("send", 0, 0);
+    let failed = |status: Status| refusal(address, &status);
+    let replies = client.submit(tokio_stream::iter(requests(part, job)));
+    let mut replies = replies.await.map_err(failed)?.into_inner();
+    let bad = |reason: String| Error::BadReply {
+        address: address.to_owned(),
+        reason,
+    };
+    let mut trajectory: Option<Trajectory> = None;
+    let mut parts = Vec::new();
+    while let Some(reply) = replies.message().await.map_err(failed)? {
+        match reply.kind {
+            Some(Reply::Progress(p)) => progress(phase(&p.phase), p.done, p.total),
+            Some(Reply::Path(header)) => {
+                progress("receive", 0, 0);
+                let header = horma_proto::trajectory_from_wire(header.trajectory.as_ref());
+                trajectory = Some(header.map_err(|e| bad(e.to_string()))?);
+            }
+            Some(Reply::Positions(positions)) => parts.push(SubTrajectory {
+                first: positions.first,
+                touches: horma_proto::unpack_positions(&positions)
+                    .map_err(|e| bad(e.to_string()))?,
+            }),
+            Some(Reply::Record(json)) => {
+                let record: Record =
+                    serde_json::from_slice(&json).map_err(|e| bad(e.to_string()))?;
+                let trajectory = trajectory.ok_or(bad("it has no header".to_owned()))?;
+                let path = stitch(trajectory, parts).map_err(|e| bad(e.to_string()))?;
+                return Ok((path, record));
+            }
+            None => return Err(bad("an empty reply".to_owned())),
+        }
+    }
+    Err(bad("it ends early".to_owned()))
+}
+
+/// The job and its part, packed as they are sent.
+fn requests(part: Part, job: Job) -> impl Iterator<Item = SubmitRequest> + Send + 'static {
+    let header = SubmitHeader {
+        version: VERSION.to_owned(),
+        job: Some(horma_proto::job_to_wire(&job)),
+    };
+    let bodies = part.bodies.into_iter();
+    let bodies = Chunks::of(bodies.map(|b| horma_proto::body_to_wire(&b)));
+    let kinds = std::iter::once(Request::Header(header)).chain(bodies.map(Request::Bodies));
+    kinds.map(|kind| SubmitRequest { kind: Some(kind) })
+}
+
+/// The names of a master's phases; what a later one may call its own is shown as this.
+fn phase(name: &str) -> &'static str {
+    let known = ["discretize", "digitize", "stitch"];
+    known.into_iter().find(|k| *k == name).unwrap_or("work")
+}
+
+/// What the master's status means for the user.
+fn refusal(address: &str, status: &Status) -> Error {
+    let (address, reason) = (address.to_owned(), status.message().to_owned());
+    match status.code() {
+        Code::InvalidArgument | Code::OutOfRange => Error::Refused { address, reason },
+        Code::Aborted | Code::FailedPrecondition => Error::JobFailed { address, reason },
+        _ => Error::NoMaster {
+            address,
+            reason: cause(status),
+        },
+    }
+}
+
+/// An error's innermost cause.
+fn cause(error: &(dyn std::error::Error + 'static)) -> String {
+    let causes = std::iter::successors(Some(error), |e| e.source());
+    causes.last().map_or_else(String::new, ToString::to_string)
+}

@@ -1,0 +1,55 @@
+//! What the machine has: memory, cores, a name; and the user's wish to stop.
+
+use sysinfo::{MemoryRefreshKind, RefreshKind, System};
+
+/// Memory that a job may take, bytes: what is available, within the limits of a container.
+pub(crate) fn memory() -> u64 {
+    let memory = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
+    // A system that does not tell gets the benefit of the doubt.
+    let Ok(system) = System::new_with_specifics(memory) else {
+        return u64::MAX;
+    };
+    let limit = system.cgroup_limits().map_or(u64::MAX, |l| l.free_memory);
+    system.available_memory().min(limit)
+}
+
+/// Cores of this machine that this process may use.
+pub(crate) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+/// A name for this process that differs from others' on this and other machines.
+pub(crate) fn process_name() -> String {
+    let host = System::host_name().unwrap_or_else(|_| "host".to_owned());
+    format!("{host}-{}", std::process::id())
+}
+
+/// A number that differs from one start of a process to the next.
+pub(crate) fn incarnation() -> u64 {
+    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let nanoseconds = since.map_or(0, |d| d.as_nanos() as u64);
+    nanoseconds.rotate_left(20) ^ u64::from(std::process::id())
+}
+
+/// Returns when the user, or the system on somebody's behalf, asks to stop.
+pub(crate) async fn interrupted() {
+    let interrupt = async {
+        if tokio::signal::ctrl_c().await.is_err() {
+            std::future::pending::<()>().await;
+        }
+    };
+    #[cfg(unix)]
+    let terminate = async {
+        use tokio::signal::unix::{SignalKind, signal};
+        match signal(SignalKind::terminate()) {
+            Ok(mut signal) => drop(signal.recv().await),
+            Err(_) => std::future::pending().await,
+        }
+    };
+    #[cfg(not(unix))]
+    let terminate = std::future::pending::<()>();
+    tokio::select! {
+        () = interrupt => {}
+        () = terminate => {}
+    }
+}

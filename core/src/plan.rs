@@ -1,0 +1,102 @@
+//! The plan: everything that follows from a part and a job before the first position is digitized.
+
+use crate::discretize::{Model, discretize};
+use crate::error::{Error, Result};
+use crate::extent::{Extent, split};
+use crate::job::{Discretization, Job};
+use crate::motion::Trajectory;
+use crate::part::{Part, Shape};
+use crate::vector::Interval;
+
+/// A job ready to be digitized, here or elsewhere.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// What was asked for.
+    pub job: Job,
+    /// The part's rows.
+    pub model: Model,
+    /// The positions.
+    pub trajectory: Trajectory,
+}
+
+/// Memory for each position: its touch while it is collected, stitched and written.
+const POSITION_BYTES: f64 = 160.0;
+
+/// Memory for each point of a grid: in its row, in the hierarchy, and its two facets.
+const POINT_BYTES: f64 = 320.0;
+
+impl Plan {
+    /// Discretizes the part and lays out the positions, if that fits into `memory` bytes.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`] before anything large is tried; those of [`discretize`] and of
+    /// [`crate::Motion::over`].
+    pub fn new(part: &Part, job: Job, memory: u64) -> Result<Self> {
+        part.validate()?;
+        job.motion.validate()?;
+        job.discretization.validate()?;
+        // The net of poles holds its surface, so this is an upper bound, and it costs nothing.
+        let upper = job.motion.over(hull(part), job.cutter.half_width())?;
+        check_memory(points(part, job.discretization), upper.positions, memory)?;
+        let model = discretize(part, job.discretization)?;
+        let x = model
+            .outlines
+            .iter()
+            .fold(Interval::EMPTY, |x, r| x.hull(r.x));
+        let trajectory = job.motion.over(x, job.cutter.half_width())?;
+        let points = model.outlines.iter().map(|o| o.points as f64).sum();
+        check_memory(points, trajectory.positions, memory)?;
+        Ok(Self {
+            job,
+            model,
+            trajectory,
+        })
+    }
+
+    /// Cuts the positions into at most `parts` extents of about equal predicted work.
+    pub fn split(&self, parts: u32) -> Vec<Extent> {
+        let Self {
+            job,
+            model,
+            trajectory,
+        } = self;
+        split(trajectory, &model.outlines, &job.cutter, job.method, parts)
+    }
+}
+
+/// Extent along the spindle of poles and vertices.
+fn hull(part: &Part) -> Interval {
+    let shapes = part.bodies.iter().map(|b| match &b.shape {
+        Shape::Mesh(mesh) => mesh.x_range(),
+        Shape::Surface(surface) => Interval::of(surface.poles().iter().map(|p| p[0])),
+    });
+    shapes.fold(Interval::EMPTY, Interval::hull)
+}
+
+/// How many points the part will have, as far as that is known before it is discretized.
+fn points(part: &Part, discretization: Discretization) -> f64 {
+    let points = part
+        .bodies
+        .iter()
+        .map(|b| match (&b.shape, discretization) {
+            (Shape::Mesh(mesh), _) => mesh.vertices().len() as f64,
+            (Shape::Surface(_), Discretization::Grid { rows, columns }) => {
+                f64::from(rows) * f64::from(columns)
+            }
+            (Shape::Surface(surface), Discretization::Tolerance(_)) => surface.poles().len() as f64,
+        });
+    points.sum()
+}
+
+fn check_memory(points: f64, positions: u64, available: u64) -> Result<()> {
+    let needed = points * POINT_BYTES + positions as f64 * POSITION_BYTES;
+    if needed > available as f64 {
+        return Err(Error::OutOfMemory {
+            points,
+            positions,
+            needed,
+            available,
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,123 @@
+//! The record of a run: how a path came about. It is filled by whoever runs the pipeline, travels
+//! from a master to its client, and ends up in the report as it is.
+
+use serde::{Deserialize, Serialize};
+
+/// What happened during a run.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Record {
+    /// How long each phase took, in order.
+    pub phases: Vec<Phase>,
+    /// What became of each body, in file order.
+    pub bodies: Vec<BodyRecord>,
+    /// What the searches cost together.
+    pub counters: Counters,
+    /// Who took part; nobody if it was one process.
+    pub workers: Vec<WorkerRecord>,
+    /// Each extent as it was delivered, in order.
+    pub extents: Vec<ExtentRecord>,
+    /// Attempts that came to nothing and were made again.
+    pub lost: Vec<LostAttempt>,
+}
+
+/// How long a phase took.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Phase {
+    /// Its name, as the progress shows it.
+    pub name: String,
+    /// Wall time, s.
+    pub seconds: f64,
+}
+
+/// What became of one body.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BodyRecord {
+    /// File, and name or number within it.
+    pub name: String,
+    /// Number of rows.
+    pub rows: u32,
+    /// Points on each row of a grid; nothing for a mesh.
+    pub columns: Option<u32>,
+    /// Number of points.
+    pub points: u64,
+    /// Number of facets.
+    pub facets: u64,
+    /// Extent along the spindle, mm.
+    pub x: [f64; 2],
+    /// Largest distance from the surface to its facets that sampling found, mm; nothing if the
+    /// grid's size was given or the body is a mesh.
+    pub deviation: Option<f64>,
+}
+
+/// What a search cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Counters {
+    /// Candidates, points or facets, whose height was computed.
+    pub evaluations: u64,
+    /// Nodes of the hierarchy whose bound was computed.
+    pub nodes: u64,
+}
+
+impl std::ops::AddAssign for Counters {
+    fn add_assign(&mut self, other: Self) {
+        self.evaluations += other.evaluations;
+        self.nodes += other.nodes;
+    }
+}
+
+/// Someone who took part.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct WorkerRecord {
+    /// Name.
+    pub worker: String,
+    /// Address at which the master reached it.
+    pub address: String,
+}
+
+/// How an extent was digitized.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExtentRecord {
+    /// Number in the job.
+    pub extent: u32,
+    /// The attempt that succeeded, from 1.
+    pub attempt: u32,
+    /// By whom.
+    pub worker: String,
+    /// First position.
+    pub first: u64,
+    /// Number of positions.
+    pub positions: u64,
+    /// Rows sent, the overlap included.
+    pub rows: u32,
+    /// Of these, how many other extents need too.
+    pub overlap_rows: u32,
+    /// Bytes from master to worker.
+    pub bytes_sent: u64,
+    /// Bytes from worker to master.
+    pub bytes_received: u64,
+    /// Wall time from sending the task to its last position, s.
+    pub seconds: f64,
+    /// Of which the worker built its hierarchy, s.
+    pub build_seconds: f64,
+    /// Of which it digitized, s.
+    pub digitize_seconds: f64,
+    /// What its searches cost.
+    pub counters: Counters,
+}
+
+/// An attempt that came to nothing.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LostAttempt {
+    /// The extent.
+    pub extent: u32,
+    /// The attempt, from 1.
+    pub attempt: u32,
+    /// By whom.
+    pub worker: String,
+    /// Positions that had arrived, and were thrown away.
+    pub positions_received: u64,
+    /// Positions of the extent.
+    pub positions: u64,
+    /// Why.
+    pub reason: String,
+}

@@ -1,0 +1,199 @@
+//! A job as it was typed: every key optional, every value with its place.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Deserializer};
+use toml::Spanned;
+
+use super::Overrides;
+
+/// Where a value comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum At {
+    /// These bytes of the job file.
+    File(Range<usize>),
+    /// A flag or an environment variable, by the key whose place it takes.
+    Flag(&'static str),
+}
+
+/// A value and where it comes from.
+#[derive(Debug)]
+pub(super) struct Given<T> {
+    pub(super) value: T,
+    pub(super) at: At,
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Given<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = Spanned::deserialize(deserializer)?;
+        Ok(Self {
+            at: At::File(spanned.span()),
+            value: spanned.into_inner(),
+        })
+    }
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawJob {
+    pub(super) part: Option<Given<RawPart>>,
+    #[serde(default)]
+    pub(super) discretization: RawDiscretization,
+    pub(super) cutter: Option<Given<RawCutter>>,
+    pub(super) motion: Option<Given<RawMotion>>,
+    #[serde(default)]
+    pub(super) digitizing: RawDigitizing,
+    #[serde(default)]
+    pub(super) cluster: RawCluster,
+    #[serde(default)]
+    pub(super) program: RawProgram,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawPart {
+    pub(super) files: Option<Given<Vec<PathBuf>>>,
+    pub(super) axis: Option<Given<toml::Value>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawAxis {
+    pub(super) point: Option<[f64; 3]>,
+    pub(super) direction: Option<[f64; 3]>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawDiscretization {
+    pub(super) tolerance: Option<Given<f64>>,
+    pub(super) grid: Option<Given<RawGrid>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawGrid {
+    pub(super) rows: Given<i64>,
+    pub(super) columns: Given<i64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawCutter {
+    pub(super) kind: Option<Given<String>>,
+    major_radius: Option<Given<f64>>,
+    minor_radius: Option<Given<f64>>,
+    radius: Option<Given<f64>>,
+    width: Option<Given<f64>>,
+    half_angle: Option<Given<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawMotion {
+    pub(super) kind: Option<Given<String>>,
+    pub(super) step: Option<Given<f64>>,
+    pub(super) points_per_revolution: Option<Given<i64>>,
+    pub(super) from: Option<Given<f64>>,
+    pub(super) to: Option<Given<f64>>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawDigitizing {
+    pub(super) contact: Option<Given<String>>,
+    pub(super) method: Option<Given<String>>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawCluster {
+    pub(super) workers: Option<Given<i64>>,
+    pub(super) distribution: Option<Given<String>>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawProgram {
+    pub(super) feed: Option<Given<f64>>,
+    pub(super) clearance: Option<Given<f64>>,
+}
+
+impl RawCutter {
+    /// Every dimension by its key.
+    pub(super) fn dimensions(&self) -> [(&'static str, Option<&Given<f64>>); 5] {
+        [
+            ("major_radius", self.major_radius.as_ref()),
+            ("minor_radius", self.minor_radius.as_ref()),
+            ("radius", self.radius.as_ref()),
+            ("width", self.width.as_ref()),
+            ("half_angle", self.half_angle.as_ref()),
+        ]
+    }
+}
+
+impl RawJob {
+    /// Puts flags and environment variables in the place of what the file says.
+    pub(super) fn replace(&mut self, by: &Overrides) {
+        fn put<T: Clone, U>(slot: &mut Option<Given<U>>, key: &'static str, by: &Option<T>)
+        where
+            U: From<T>,
+        {
+            if let Some(value) = by.clone() {
+                *slot = Some(Given {
+                    value: value.into(),
+                    at: At::Flag(key),
+                });
+            }
+        }
+        put(&mut self.cluster.workers, "workers", &by.workers);
+        put(
+            &mut self.cluster.distribution,
+            "distribution",
+            &by.distribution,
+        );
+        put(&mut self.digitizing.contact, "contact", &by.contact);
+        put(&mut self.digitizing.method, "method", &by.method);
+        put(&mut self.program.feed, "feed", &by.feed);
+        put(&mut self.program.clearance, "clearance", &by.clearance);
+        if by.tolerance.is_some() {
+            self.discretization.grid = None;
+            put(
+                &mut self.discretization.tolerance,
+                "tolerance",
+                &by.tolerance,
+            );
+        }
+        if let Some(motion) = &mut self.motion {
+            let motion = &mut motion.value;
+            let points = &mut motion.points_per_revolution;
+            put(points, "points_per_revolution", &by.points_per_revolution);
+            put(&mut motion.step, "step", &by.step);
+            put(&mut motion.from, "from", &by.from);
+            put(&mut motion.to, "to", &by.to);
+        }
+    }
+
+    /// Where the value of `key` comes from; no two sections share one that the core knows.
+    pub(super) fn at(&self, key: &str) -> Option<&At> {
+        fn number<T>(given: &Option<Given<T>>) -> Option<&At> {
+            given.as_ref().map(|g| &g.at)
+        }
+        let motion = self.motion.as_ref().map(|m| &m.value);
+        let grid = self.discretization.grid.as_ref().map(|g| &g.value);
+        match key {
+            "tolerance" => number(&self.discretization.tolerance),
+            "rows" => grid.map(|g| &g.rows.at),
+            "columns" => grid.map(|g| &g.columns.at),
+            "step" => number(&motion?.step),
+            "points_per_revolution" => number(&motion?.points_per_revolution),
+            "from" => number(&motion?.from),
+            "to" => number(&motion?.to),
+            _ => {
+                let mut dimensions = self.cutter.as_ref()?.value.dimensions().into_iter();
+                dimensions.find_map(|(k, v)| v.filter(|_| k == key).map(|g| &g.at))
+            }
+        }
+    }
+}

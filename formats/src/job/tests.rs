@@ -1,0 +1,348 @@
+use super::*;
+
+const JOB: &str = r#"[part]
+files = ["last.step", "/abs/holder.stl"]
+axis = { point = [0, 0, 14], direction = [1, 0, 0] }
+[discretization]
+tolerance = 0.02
+[cutter]
+kind = "torus"
+major_radius = 40
+minor_radius = 8.0
+[motion]
+kind = "rings"
+step = 2
+points_per_revolution = 360
+from = -3
+[digitizing]
+contact = "point"
+method = "brute"
+[cluster]
+workers = 3
+distribution = "overlap"
+[program]
+feed = 1500
+clearance = 5
+"#;
+
+const SHORT: &str = "[part]\nfiles = ['a.stl']\n[cutter]\nkind = 'ball'\nradius = 5\n\
+    [motion]\nstep = 1\npoints_per_revolution = 90\n";
+
+fn job(text: &str, overrides: &Overrides) -> Result<JobFile> {
+    parse(text, Path::new("jobs/job.toml"), overrides)
+}
+
+fn valid(text: &str) -> JobFile {
+    job(text, &Overrides::default()).expect("valid")
+}
+
+/// `JOB` with `old` replaced by `new` is refused with `expected`.
+#[track_caller]
+fn refused(old: &str, new: &str, expected: &str) {
+    assert!(JOB.contains(old), "{old}");
+    let text = JOB.replacen(old, new, 1);
+    let error = job(&text, &Overrides::default())
+        .expect_err(new)
+        .to_string();
+    assert!(error.contains(expected), "{error}");
+}
+
+#[test]
+fn a_full_job_means_what_it_says() {
+    let j = valid(JOB);
+    let files = ["jobs/last.step", "/abs/holder.stl"].map(PathBuf::from);
+    assert_eq!(j.files, files);
+    let axis = Axis::Through {
+        point: [0.0, 0.0, 14.0],
+        direction: [1.0, 0.0, 0.0],
+    };
+    assert_eq!(j.axis, axis);
+    assert_eq!(j.job.discretization, Discretization::Tolerance(0.02));
+    assert_eq!(Ok(j.job.cutter), Cutter::torus(40.0, 8.0));
+    assert_eq!(
+        (j.job.motion.kind, j.job.motion.step),
+        (MotionKind::Rings, 2.0)
+    );
+    assert_eq!((j.job.motion.from, j.job.motion.to), (Some(-3.0), None));
+    assert_eq!(
+        (j.job.contact, j.job.method),
+        (Contact::Point, Method::Brute)
+    );
+    assert_eq!(j.cluster.workers, 3);
+    assert_eq!((j.program.feed, j.program.clearance), (1500.0, 5.0));
+}
+
+#[test]
+fn what_is_left_out_has_defaults() {
+    let j = valid(SHORT);
+    assert_eq!(j.axis, Axis::default());
+    assert_eq!(
+        j.job.discretization,
+        Discretization::Tolerance(DEFAULT_TOLERANCE)
+    );
+    assert_eq!(Ok(j.job.cutter), Cutter::ball(5.0));
+    assert_eq!(j.job.motion.kind, MotionKind::Helix);
+    assert_eq!(
+        (j.job.contact, j.job.method),
+        (Contact::Facet, Method::Exact)
+    );
+    assert_eq!(j.cluster.workers, 0);
+    assert_eq!(
+        (j.program.feed, j.program.clearance),
+        (DEFAULT_FEED, DEFAULT_CLEARANCE)
+    );
+    let auto = SHORT.replace("[cutter]", "axis = \"auto\"\n[cutter]");
+    assert_eq!(valid(&auto).axis, Axis::Principal);
+}
+
+#[test]
+fn the_place_is_shown_under_the_line() {
+    let text = JOB.replacen("minor_radius = 8.0", "minor_radius = -8.0", 1);
+    let error = job(&text, &Overrides::default())
+        .expect_err("negative")
+        .to_string();
+    let expected = "minor_radius is -8, but must be greater than 0 and at most 10000 mm
+ --> jobs/job.toml:9:16
+  |
+9 | minor_radius = -8.0
+  |                ^^^^";
+    assert_eq!(error, expected);
+    refused(
+        "step = 2",
+        "step = 0",
+        "\n  --> jobs/job.toml:12:8\n   |\n12 | step = 0\n   |        ^",
+    );
+}
+
+#[test]
+fn numbers_out_of_bounds_are_refused_at_their_key() {
+    refused("= 40", "= -40", "major_radius is -40");
+    refused("= 40", "= nan", "major_radius is NaN");
+    refused("0.02", "0", "tolerance is 0, but must be at least");
+    refused(
+        "tolerance = 0.02",
+        "grid = { rows = 1, columns = 9 }",
+        "rows is 1, but must be",
+    );
+    refused(
+        "tolerance = 0.02",
+        "grid = { rows = 9, columns = -1 }",
+        "columns is -1, but",
+    );
+    refused(
+        "step = 2",
+        "step = 0",
+        "step is 0, but must be greater than 0 mm",
+    );
+    refused(
+        "= 360",
+        "= 0",
+        "points_per_revolution is 0, but must be at least 1",
+    );
+    refused(
+        "= 360",
+        "= -360",
+        "points_per_revolution is -360, but must be",
+    );
+    refused("from = -3", "from = inf", "from is inf");
+    refused(
+        "from = -3",
+        "from = 3\nto = 2",
+        "the travel goes from 3 to 2",
+    );
+    refused("workers = 3", "workers = -1", "workers is -1");
+    refused("workers = 3", "workers = 10001", "at most 10000");
+    refused(
+        "feed = 1500",
+        "feed = 0",
+        "feed is 0, but must be greater than 0",
+    );
+    refused("clearance = 5", "clearance = -1", "clearance is -1");
+    refused("[1, 0, 0]", "[0, 0, 0]", "which has no length");
+    refused("[0, 0, 14]", "[0, nan, 14]", "must be finite");
+    let cone = "kind = \"cone\"\nradius = 10\nwidth = 30\nhalf_angle = 45\n";
+    let torus = "kind = \"torus\"\nmajor_radius = 40\nminor_radius = 8.0\n";
+    refused(torus, cone, "allows at most 33.");
+    refused(torus, cone, "10 | half_angle = 45");
+}
+
+#[test]
+fn keys_and_choices_that_are_unknown_are_refused_with_the_known_ones() {
+    refused(
+        "[motion]",
+        "[motions]",
+        "unknown key `motions`, expected one of `part`",
+    );
+    refused(
+        "step = 2",
+        "stepp = 2",
+        "unknown key `stepp`, expected one of `kind`, `step`",
+    );
+    refused(
+        "\"torus\"",
+        "\"flat-end\"",
+        "unknown cutter 'flat-end'; known: torus, ball, cyl",
+    );
+    refused(
+        "\"torus\"",
+        "\"ball\"",
+        "major_radius does not belong to a ball, which has radius",
+    );
+    refused(
+        "\"rings\"",
+        "\"lines\"",
+        "unknown motion 'lines'; known: helix, rings",
+    );
+    refused(
+        "\"point\"",
+        "\"line\"",
+        "unknown contact 'line'; known: facet, point",
+    );
+    refused(
+        "\"brute\"",
+        "\"local\"",
+        "unknown method 'local'; known: exact, brute",
+    );
+    refused(
+        "\"overlap\"",
+        "\"halo\"",
+        "unknown distribution 'halo'; known: overlap",
+    );
+    refused("direction", "dir", "unknown key `dir`");
+}
+
+#[test]
+fn wrong_types_are_refused() {
+    refused(
+        "step = 2",
+        "step = \"2\"",
+        "invalid type: string \"2\", expected a number",
+    );
+    refused("= 360", "= 36.5", "expected a whole number");
+    refused(
+        "[\"last.step\", \"/abs/holder.stl\"]",
+        "\"last.step\"",
+        "expected a list",
+    );
+    refused(
+        "{ point = [0, 0, 14], direction = [1, 0, 0] }",
+        "\"x\"",
+        "axis must be \"auto\" or",
+    );
+    refused("[0, 0, 14]", "[0, 0]", "axis must be \"auto\" or");
+    refused("step = 2", "step = ", "jobs/job.toml:12:");
+    refused("step = 2", "step = 2\nstep = 3", "jobs/job.toml:13:");
+}
+
+#[test]
+fn what_is_missing_is_asked_for() {
+    refused(JOB, "", "there is no [part]; say what to machine");
+    refused(
+        "files = [\"last.step\", \"/abs/holder.stl\"]\n",
+        "",
+        "[part] has no files",
+    );
+    refused(
+        "\"last.step\", \"/abs/holder.stl\"",
+        "",
+        "at least one file",
+    );
+    refused("kind = \"torus\"\n", "", "[cutter] has no kind");
+    refused(
+        "minor_radius = 8.0\n",
+        "",
+        "a torus needs minor_radius, in mm",
+    );
+    refused(
+        "step = 2\n",
+        "",
+        "[motion] has no step; give one, as in step = 2.0",
+    );
+    refused("step = 2\n", "", "10 | [motion]");
+    refused(
+        "points_per_revolution = 360\n",
+        "",
+        "[motion] has no points_per_revolution",
+    );
+    let both = "tolerance = 0.1\ngrid = { rows = 9, columns = 9 }";
+    refused("tolerance = 0.02", both, "both given");
+    refused(
+        "tolerance = 0.02",
+        "grid = { rows = 9 }",
+        "missing key `columns`",
+    );
+    let (part, rest) = SHORT.split_at(SHORT.find("[cutter]").expect("there"));
+    let no_motion = &SHORT[..SHORT.find("[motion]").expect("there")];
+    for (text, expected) in [
+        (part, "no [cutter]"),
+        (rest, "no [part]"),
+        (no_motion, "no [motion]"),
+    ] {
+        let error = job(text, &Overrides::default())
+            .expect_err(expected)
+            .to_string();
+        assert!(
+            error.contains(expected) && error.ends_with("--> jobs/job.toml"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn flags_take_the_place_of_the_file() {
+    let overrides = Overrides {
+        workers: Some(5),
+        tolerance: Some(0.5),
+        step: Some(3.0),
+        contact: Some("facet".to_owned()),
+        to: Some(9.0),
+        ..Overrides::default()
+    };
+    let text = JOB.replacen("tolerance = 0.02", "grid = { rows = 9, columns = 9 }", 1);
+    let j = job(&text, &overrides).expect("valid");
+    assert_eq!((j.cluster.workers, j.job.contact), (5, Contact::Facet));
+    assert_eq!(j.job.discretization, Discretization::Tolerance(0.5));
+    assert_eq!((j.job.motion.step, j.job.motion.to), (3.0, Some(9.0)));
+    let zero = Overrides {
+        points_per_revolution: Some(0),
+        ..Overrides::default()
+    };
+    let error = job(JOB, &zero).expect_err("zero").to_string();
+    let given = "at least 1 (given as --points-per-revolution or HORMA_POINTS_PER_REVOLUTION)";
+    assert!(error.ends_with(given), "{error}");
+}
+
+#[test]
+fn the_echo_is_a_job_again() {
+    let j = valid(JOB);
+    let mut echo = j.echo();
+    // TOML has no null.
+    echo["motion"]
+        .as_object_mut()
+        .expect("a table")
+        .retain(|_, v| !v.is_null());
+    let text = toml::to_string(&echo).expect("TOML");
+    let again = parse(&text, Path::new("job.toml"), &Overrides::default()).expect("valid");
+    assert_eq!(again, j);
+}
+
+#[test]
+fn no_text_makes_it_panic() {
+    for cut in (0..JOB.len()).filter(|&i| JOB.is_char_boundary(i)) {
+        let _ = job(&JOB[..cut], &Overrides::default());
+    }
+    for text in [
+        "é = \u{1F45E}",
+        "\u{feff}[part]",
+        "[part]\nfiles = [\"\"]\r\n",
+        "= \n\"é",
+    ] {
+        assert!(job(text, &Overrides::default()).is_err(), "{text}");
+    }
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let error = read(Path::new("none/job.toml"), &Overrides::default()).expect_err("missing");
+    assert!(error.to_string().contains("none/job.toml"), "{error}");
+}

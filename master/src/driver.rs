@@ -1,0 +1,445 @@
+//! The driver: one task that owns the state, turns messages into events, and carries out commands.
+//!
+//! Positions never pass through the state. They wait here, by job and extent, until the job is
+//! complete and can be stitched.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+use std::time::Instant;
+
+use horma_core::{
+    Counters, Extent, ExtentRecord, Job, LostAttempt, Part, Phase, Plan, Record, SubTrajectory,
+    WorkerRecord, stitch,
+};
+use horma_proto::TaskId;
+use tokio::sync::{mpsc, oneshot, watch};
+use tokio_util::sync::CancellationToken;
+use tracing::{info, warn};
+
+use crate::dispatch::{Attempt, Delivery, Undelivered, dispatch};
+use crate::error::{Error, Result};
+use crate::state::{Command, Event, State, apply};
+use crate::{Config, Outcome, Progress};
+
+/// Messages that may wait for the driver.
+const INBOX: usize = 256;
+
+/// A handle to a running master.
+#[derive(Debug, Clone)]
+pub struct Master {
+    inbox: mpsc::Sender<Message>,
+    workers: watch::Receiver<usize>,
+    config: Config,
+}
+
+/// What the driver is told.
+pub(crate) enum Message {
+    Register {
+        worker: String,
+        incarnation: u64,
+        address: String,
+        /// Whether it is welcome.
+        reply: oneshot::Sender<bool>,
+    },
+    Heartbeat {
+        worker: String,
+        incarnation: u64,
+        /// Whether it is known.
+        reply: oneshot::Sender<bool>,
+    },
+    Run {
+        plan: Arc<Plan>,
+        parts: u32,
+        progress: Progress,
+        reply: oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>,
+    },
+    Over {
+        worker: String,
+        task: TaskId,
+        outcome: std::result::Result<Delivery, Undelivered>,
+    },
+}
+
+impl Master {
+    pub(crate) fn start(config: Config, shutdown: CancellationToken) -> Self {
+        let (inbox, messages) = mpsc::channel(INBOX);
+        let (count, workers) = watch::channel(0);
+        let driver = Driver {
+            config,
+            begin: Instant::now(),
+            state: State::new(config.lease, config.regroup),
+            addresses: BTreeMap::new(),
+            jobs: BTreeMap::new(),
+            next_job: 1,
+            inbox: inbox.downgrade(),
+            count,
+        };
+        tokio::spawn(driver.run(messages, shutdown));
+        Self {
+            inbox,
+            workers,
+            config,
+        }
+    }
+
+    /// Number of workers, as it changes.
+    pub fn workers(&self) -> watch::Receiver<usize> {
+        self.workers.clone()
+    }
+
+    /// Runs a job on the workers there are, after waiting for `at_least` of them to register.
+    /// Dropping the future cancels the job.
+    ///
+    /// # Errors
+    /// [`Error::Plan`] if the job cannot be done at all, [`Error::NoWorkers`] if they do not come
+    /// in time, and whatever made it fail on the cluster.
+    pub async fn run(
+        &self,
+        part: Part,
+        job: Job,
+        at_least: usize,
+        progress: Progress,
+    ) -> Result<Outcome> {
+        let begin = Instant::now();
+        progress("discretize", 0, 0);
+        let plan = Arc::new(crate::plan(part, job, self.config.memory).await?);
+        let discretized = begin.elapsed();
+        let parts = self.gather(at_least.max(1)).await?;
+
+        let begin = Instant::now();
+        let (reply, outcome) = oneshot::channel();
+        let message = Message::Run {
+            plan: plan.clone(),
+            parts,
+            progress: progress.clone(),
+            reply,
+        };
+        self.tell(message).await?;
+        let (parts, mut record) = outcome.await.map_err(|_| Error::Interrupted)??;
+        let digitized = begin.elapsed();
+
+        progress("stitch", 0, 0);
+        let begin = Instant::now();
+        let path = stitch(plan.trajectory, parts).map_err(Error::Stitch)?;
+        let stitched = begin.elapsed();
+        record.phases = [
+            ("discretize", discretized),
+            ("digitize", digitized),
+            ("stitch", stitched),
+        ]
+        .map(|(name, time)| Phase {
+            name: name.to_owned(),
+            seconds: time.as_secs_f64(),
+        })
+        .into();
+        record.bodies.clone_from(&plan.model.bodies);
+        Ok((path, record))
+    }
+
+    /// Waits until enough workers are there; returns how many.
+    async fn gather(&self, at_least: usize) -> Result<u32> {
+        let mut workers = self.workers.clone();
+        let enough = workers.wait_for(|&n| n >= at_least);
+        match tokio::time::timeout(self.config.patience, enough).await {
+            Ok(Ok(count)) => Ok(*count as u32),
+            Ok(Err(_)) => Err(Error::Interrupted),
+            Err(_) => Err(Error::NoWorkers {
+                seconds: self.config.patience.as_secs(),
+            }),
+        }
+    }
+
+    pub(crate) async fn tell(&self, message: Message) -> Result<()> {
+        self.inbox
+            .send(message)
+            .await
+            .map_err(|_| Error::Interrupted)
+    }
+}
+
+struct Driver {
+    config: Config,
+    begin: Instant,
+    state: State,
+    addresses: BTreeMap<String, String>,
+    jobs: BTreeMap<u64, RunningJob>,
+    next_job: u64,
+    inbox: mpsc::WeakSender<Message>,
+    count: watch::Sender<usize>,
+}
+
+struct RunningJob {
+    plan: Arc<Plan>,
+    extents: Vec<Extent>,
+    progress: Progress,
+    /// Positions that have arrived.
+    arrived: Arc<AtomicU64>,
+    /// What was delivered and kept, by extent.
+    kept: BTreeMap<u32, (SubTrajectory, ExtentRecord)>,
+    lost: Vec<LostAttempt>,
+    /// Calls under way: each ends when it is told why, or when the job is dropped.
+    calls: BTreeMap<TaskId, oneshot::Sender<String>>,
+    workers: BTreeMap<String, String>,
+    reply: oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>,
+}
+
+impl Driver {
+    async fn run(mut self, mut messages: mpsc::Receiver<Message>, shutdown: CancellationToken) {
+        let mut ticks = tokio::time::interval(self.config.heartbeat / 2);
+        loop {
+            tokio::select! {
+                () = shutdown.cancelled() => break,
+                _ = ticks.tick() => self.tick(),
+                message = messages.recv() => match message {
+                    Some(message) => self.handle(message),
+                    None => break,
+                },
+            }
+            self.count.send_if_modified(|n| {
+                let now = self.state.workers();
+                std::mem::replace(n, now) != now
+            });
+        }
+        for job in self.jobs.into_values() {
+            // The one who asked may be gone as well.
+            let _ = job.reply.send(Err(Error::Interrupted));
+        }
+    }
+
+    fn tick(&mut self) {
+        self.apply(Event::Tick, None);
+        // A client that no longer waits has cancelled its job.
+        let gone = |(&id, job): (&u64, &RunningJob)| job.reply.is_closed().then_some(id);
+        for job in self.jobs.iter().filter_map(gone).collect::<Vec<_>>() {
+            info!(job, "cancelled");
+            self.apply(Event::Cancelled { job }, None);
+            self.jobs.remove(&job);
+        }
+    }
+
+    fn handle(&mut self, message: Message) {
+        match message {
+            Message::Register {
+                worker,
+                incarnation,
+                address,
+                reply,
+            } => {
+                let welcome = !self.state.distrusts(&worker, incarnation);
+                if welcome {
+                    info!(worker, incarnation, address, "registered");
+                    self.addresses.insert(worker.clone(), address);
+                    self.apply(
+                        Event::Registered {
+                            worker,
+                            incarnation,
+                        },
+                        None,
+                    );
+                }
+                // A worker that hangs up meanwhile will register again.
+                let _ = reply.send(welcome);
+            }
+            Message::Heartbeat {
+                worker,
+                incarnation,
+                reply,
+            } => {
+                let known = self.state.knows(&worker, incarnation);
+                if known {
+                    self.apply(Event::Heartbeat { worker }, None);
+                }
+                let _ = reply.send(known);
+            }
+            Message::Run {
+                plan,
+                parts,
+                progress,
+                reply,
+            } => {
+                let job = self.next_job;
+                self.next_job += 1;
+                let extents = plan.split(parts);
+                info!(
+                    job,
+                    extents = extents.len(),
+                    positions = plan.trajectory.positions,
+                    "job"
+                );
+                progress("digitize", 0, plan.trajectory.positions);
+                let count = extents.len() as u32;
+                let running = RunningJob {
+                    plan,
+                    extents,
+                    progress,
+                    arrived: Arc::default(),
+                    kept: BTreeMap::new(),
+                    lost: Vec::new(),
+                    calls: BTreeMap::new(),
+                    workers: BTreeMap::new(),
+                    reply,
+                };
+                self.jobs.insert(job, running);
+                self.apply(
+                    Event::Submitted {
+                        job,
+                        extents: count,
+                    },
+                    None,
+                );
+            }
+            Message::Over {
+                worker,
+                task,
+                outcome,
+            } => self.over(worker, task, outcome),
+        }
+    }
+
+    /// A call is over, well or not.
+    fn over(
+        &mut self,
+        worker: String,
+        task: TaskId,
+        outcome: std::result::Result<Delivery, Undelivered>,
+    ) {
+        let Some(job) = self.jobs.get_mut(&task.job) else {
+            return;
+        };
+        job.calls.remove(&task);
+        match outcome {
+            Ok(delivery) => {
+                info!(%task, worker, "delivered");
+                self.apply(Event::Delivered { worker, task }, Some(delivery));
+            }
+            Err(Undelivered {
+                fault,
+                positions_received,
+            }) => {
+                warn!(%task, worker, ?fault, positions_received, "not delivered");
+                job.lost.push(LostAttempt {
+                    extent: task.extent,
+                    attempt: task.attempt,
+                    worker: worker.clone(),
+                    positions_received,
+                    positions: job.extents[task.extent as usize].count,
+                    reason: fault.to_string(),
+                });
+                self.apply(
+                    Event::Failed {
+                        worker,
+                        task,
+                        fault,
+                    },
+                    None,
+                );
+            }
+        }
+    }
+
+    fn apply(&mut self, event: Event, mut delivery: Option<Delivery>) {
+        for command in apply(&mut self.state, self.begin.elapsed(), event) {
+            match command {
+                Command::Start { worker, task } => self.start(worker, task),
+                Command::Abort { task, reason } => {
+                    info!(%task, reason, "aborted");
+                    let job = self.jobs.get_mut(&task.job);
+                    if let Some(call) = job.and_then(|j| j.calls.remove(&task)) {
+                        // A call that is over by now needs no telling.
+                        let _ = call.send(reason);
+                    }
+                }
+                Command::Keep { task } => {
+                    if let (Some(job), Some(delivery)) =
+                        (self.jobs.get_mut(&task.job), delivery.take())
+                    {
+                        job.kept
+                            .insert(task.extent, (delivery.positions, delivery.record));
+                    }
+                }
+                Command::Complete { job } => {
+                    if let Some(job) = self.jobs.remove(&job) {
+                        job.complete();
+                    }
+                }
+                Command::Fail { job, error } => {
+                    warn!(job, %error, "failed");
+                    if let Some(job) = self.jobs.remove(&job) {
+                        let _ = job.reply.send(Err(error));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Brings a task to a worker, in the background.
+    fn start(&mut self, worker: String, task: TaskId) {
+        let (Some(job), Some(address)) =
+            (self.jobs.get_mut(&task.job), self.addresses.get(&worker))
+        else {
+            return;
+        };
+        let (call, cut_off) = oneshot::channel();
+        job.calls.insert(task, call);
+        job.workers.insert(worker.clone(), address.clone());
+        let extent = job.extents[task.extent as usize].clone();
+        let others: usize = job
+            .extents
+            .iter()
+            .filter(|e| e.id != extent.id)
+            .map(|e| shared(&e.rows, &extent.rows))
+            .sum();
+        let attempt = Attempt {
+            task,
+            worker: worker.clone(),
+            address: address.clone(),
+            plan: job.plan.clone(),
+            overlap_rows: others.min(extent.rows.len()) as u32,
+            extent,
+            arrived: job.arrived.clone(),
+            progress: job.progress.clone(),
+        };
+        info!(%task, worker, positions = attempt.extent.count, "started");
+        let inbox = self.inbox.clone();
+        tokio::spawn(async move {
+            let outcome = dispatch(attempt, cut_off).await;
+            if let Some(inbox) = inbox.upgrade() {
+                let over = Message::Over {
+                    worker,
+                    task,
+                    outcome,
+                };
+                // The driver may have stopped: then nobody waits for this.
+                let _ = inbox.send(over).await;
+            }
+        });
+    }
+}
+
+/// How many ids two ordered lists share.
+fn shared(a: &[u32], b: &[u32]) -> usize {
+    a.iter().filter(|id| b.binary_search(id).is_ok()).count()
+}
+
+impl RunningJob {
+    /// Hands over what was kept.
+    fn complete(self) {
+        let mut counters = Counters::default();
+        let (mut parts, mut extents) = (Vec::new(), Vec::new());
+        for (positions, record) in self.kept.into_values() {
+            counters += record.counters;
+            parts.push(positions);
+            extents.push(record);
+        }
+        let worker = |(worker, address)| WorkerRecord { worker, address };
+        let record = Record {
+            counters,
+            workers: self.workers.into_iter().map(worker).collect(),
+            extents,
+            lost: self.lost,
+            ..Record::default()
+        };
+        let _ = self.reply.send(Ok((parts, record)));
+    }
+}

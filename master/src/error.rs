@@ -1,0 +1,55 @@
+//! Why a job or a master fails.
+
+use std::sync::Arc;
+
+/// Everything that ends a job or a master.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum Error {
+    /// The job cannot be planned.
+    #[error(transparent)]
+    Plan(horma_core::Error),
+    /// There is nobody to do it.
+    #[error("no worker registered within {seconds} s")]
+    NoWorkers {
+        /// How long the job waited.
+        seconds: u64,
+    },
+    /// Everybody who could have done it is gone.
+    #[error("no worker is left: {last}")]
+    AllLost {
+        /// How the last one was lost.
+        last: String,
+    },
+    /// An extent that nobody can do.
+    #[error("extent {extent} failed {attempts} times, the last time because {last}")]
+    TooManyAttempts {
+        /// The extent.
+        extent: u32,
+        /// How often it was tried.
+        attempts: u32,
+        /// How the last attempt ended.
+        last: String,
+    },
+    /// Stitching found that the sub-trajectories do not make a path.
+    #[error("the workers' positions do not make a path: {0}")]
+    Stitch(horma_core::Error),
+    /// The master is stopping.
+    #[error("the master was stopped before the job was done")]
+    Interrupted,
+    /// The server stopped.
+    #[error("cannot serve: {0}")]
+    Serve(Arc<tonic::transport::Error>),
+}
+
+/// The result of a job or of a master's life.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl From<Error> for horma_proto::Error {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Plan(e) => Self::Core(e),
+            Error::Interrupted => Self::ShuttingDown("the master"),
+            other => Self::JobFailed(other.to_string()),
+        }
+    }
+}

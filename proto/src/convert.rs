@@ -1,0 +1,378 @@
+//! Wire ↔ core. Going out cannot fail; coming in, everything is checked by the core's own
+//! constructors.
+
+use bytes::Bytes;
+use horma_core::{
+    Body, Contact, Cutter, Direction, Discretization, Job, Mesh, Method, Motion, MotionKind, Point,
+    Row, RowKind, Shape, Surface, Trajectory,
+};
+
+use crate::error::{Error, Result};
+use crate::wire;
+
+fn missing(message: &'static str, field: &'static str) -> Error {
+    Error::Missing { message, field }
+}
+
+/// A job for the wire.
+pub fn job_to_wire(job: &Job) -> wire::Job {
+    use wire::job::{Cutter as C, Discretization as D};
+    wire::Job {
+        discretization: Some(match job.discretization {
+            Discretization::Grid { rows, columns } => D::Grid(wire::Grid { rows, columns }),
+            Discretization::Tolerance(t) => D::Tolerance(t),
+        }),
+        cutter: Some(match job.cutter {
+            Cutter::Torus {
+                major_radius,
+                minor_radius,
+            } => C::Torus(wire::Torus {
+                major_radius,
+                minor_radius,
+            }),
+            Cutter::Cone {
+                radius,
+                width,
+                half_angle,
+                ..
+            } => C::Cone(wire::Cone {
+                radius,
+                width,
+                half_angle,
+            }),
+        }),
+        motion: Some(wire::Motion {
+            kind: kind_to_wire(job.motion.kind).into(),
+            step: job.motion.step,
+            points_per_revolution: job.motion.points_per_revolution,
+            from: job.motion.from,
+            to: job.motion.to,
+        }),
+        contact: match job.contact {
+            Contact::Point => wire::Contact::Point,
+            Contact::Facet => wire::Contact::Facet,
+        }
+        .into(),
+        method: match job.method {
+            Method::Exact => wire::Method::Exact,
+            Method::Brute => wire::Method::Brute,
+        }
+        .into(),
+    }
+}
+
+/// A job from the wire.
+///
+/// # Errors
+/// [`Error::Missing`] or [`Error::Core`].
+pub fn job_from_wire(job: &wire::Job) -> Result<Job> {
+    use wire::job::{Cutter as C, Discretization as D};
+    let discretization = match job.discretization {
+        Some(D::Grid(wire::Grid { rows, columns })) => Discretization::Grid { rows, columns },
+        Some(D::Tolerance(t)) => Discretization::Tolerance(t),
+        None => return Err(missing("job", "a discretization")),
+    };
+    let cutter = match &job.cutter {
+        Some(C::Torus(t)) => Cutter::torus(t.major_radius, t.minor_radius)?,
+        Some(C::Cone(c)) => Cutter::cone(c.radius, c.width, c.half_angle)?,
+        None => return Err(missing("job", "a cutter")),
+    };
+    let motion = job.motion.as_ref().ok_or(missing("job", "a motion"))?;
+    let motion = Motion {
+        kind: kind_from_wire(motion.kind())?,
+        step: motion.step,
+        points_per_revolution: motion.points_per_revolution,
+        from: motion.from,
+        to: motion.to,
+    };
+    discretization.validate()?;
+    motion.validate()?;
+    Ok(Job {
+        discretization,
+        cutter,
+        motion,
+        contact: match job.contact() {
+            wire::Contact::Point => Contact::Point,
+            wire::Contact::Facet => Contact::Facet,
+            wire::Contact::Unspecified => return Err(missing("job", "a contact")),
+        },
+        method: match job.method() {
+            wire::Method::Exact => Method::Exact,
+            wire::Method::Brute => Method::Brute,
+            wire::Method::Unspecified => return Err(missing("job", "a method")),
+        },
+    })
+}
+
+fn kind_to_wire(kind: MotionKind) -> wire::MotionKind {
+    match kind {
+        MotionKind::Helix => wire::MotionKind::Helix,
+        MotionKind::Rings => wire::MotionKind::Rings,
+    }
+}
+
+fn kind_from_wire(kind: wire::MotionKind) -> Result<MotionKind> {
+    match kind {
+        wire::MotionKind::Helix => Ok(MotionKind::Helix),
+        wire::MotionKind::Rings => Ok(MotionKind::Rings),
+        wire::MotionKind::Unspecified => Err(missing("motion", "a kind")),
+    }
+}
+
+/// A trajectory for the wire.
+pub fn trajectory_to_wire(t: &Trajectory) -> wire::Trajectory {
+    wire::Trajectory {
+        kind: kind_to_wire(t.kind).into(),
+        from: t.from,
+        step: t.step,
+        points_per_revolution: t.points_per_revolution,
+        positions: t.positions,
+    }
+}
+
+/// A trajectory from the wire.
+///
+/// # Errors
+/// [`Error::Missing`] or [`Error::Core`].
+pub fn trajectory_from_wire(t: Option<&wire::Trajectory>) -> Result<Trajectory> {
+    let t = t.ok_or(missing("task", "a trajectory"))?;
+    let kind = kind_from_wire(t.kind())?;
+    let motion = Motion {
+        kind,
+        step: t.step,
+        points_per_revolution: t.points_per_revolution,
+        from: Some(t.from),
+        to: None,
+    };
+    motion.validate()?;
+    Ok(Trajectory {
+        kind,
+        from: t.from,
+        step: t.step,
+        points_per_revolution: t.points_per_revolution,
+        positions: t.positions,
+    })
+}
+
+/// A row for the wire.
+pub fn row_to_wire(row: &Row) -> wire::Row {
+    use wire::row::Kind;
+    wire::Row {
+        id: row.id,
+        points: pack_points(&row.points),
+        kind: Some(match &row.kind {
+            &RowKind::Isoline { joins_next } => Kind::Isoline(wire::Isoline { joins_next }),
+            RowKind::Slab { facets } => Kind::Slab(wire::Slab {
+                facets: pack_triangles(facets),
+            }),
+        }),
+    }
+}
+
+/// A row from the wire.
+///
+/// # Errors
+/// [`Error::Missing`], [`Error::Ragged`] or [`Error::Core`].
+pub fn row_from_wire(row: &wire::Row) -> Result<Row> {
+    use wire::row::Kind;
+    let kind = match row.kind.as_ref().ok_or(missing("row", "a kind"))? {
+        Kind::Isoline(isoline) => RowKind::Isoline {
+            joins_next: isoline.joins_next,
+        },
+        Kind::Slab(slab) => RowKind::Slab {
+            facets: unpack_triangles(&slab.facets)?,
+        },
+    };
+    let row = Row {
+        id: row.id,
+        points: unpack_points(&row.points)?,
+        kind,
+    };
+    row.validate()?;
+    Ok(row)
+}
+
+/// A body for the wire.
+pub fn body_to_wire(body: &Body) -> wire::Body {
+    use wire::body::Shape as S;
+    let direction = |d: &Direction| {
+        Some(wire::Direction {
+            degree: d.degree as u32,
+            knots: d.knots.clone(),
+        })
+    };
+    wire::Body {
+        name: body.name.clone(),
+        shape: Some(match &body.shape {
+            Shape::Surface(surface) => S::Surface(wire::Surface {
+                u: direction(surface.u()),
+                v: direction(surface.v()),
+                poles: pack_points(surface.poles()),
+                weights: surface.weights().unwrap_or_default().to_vec(),
+            }),
+            Shape::Mesh(mesh) => S::Mesh(wire::Mesh {
+                vertices: pack_points(mesh.vertices()),
+                triangles: pack_triangles(mesh.triangles()),
+            }),
+        }),
+    }
+}
+
+/// A body from the wire.
+///
+/// # Errors
+/// [`Error::Missing`], [`Error::Ragged`] or [`Error::Core`].
+pub fn body_from_wire(body: wire::Body) -> Result<Body> {
+    use wire::body::Shape as S;
+    let direction = |d: Option<wire::Direction>| {
+        let d = d.ok_or(missing("surface", "a direction"))?;
+        Ok::<_, Error>(Direction {
+            degree: d.degree as usize,
+            knots: d.knots,
+        })
+    };
+    let name = body.name;
+    let shape = match body.shape.ok_or(missing("body", "a shape"))? {
+        S::Surface(s) => Shape::Surface(Surface::new(
+            &name,
+            direction(s.u)?,
+            direction(s.v)?,
+            unpack_points(&s.poles)?,
+            (!s.weights.is_empty()).then_some(s.weights),
+        )?),
+        S::Mesh(m) => Shape::Mesh(Mesh::new(
+            &name,
+            unpack_points(&m.vertices)?,
+            unpack_triangles(&m.triangles)?,
+        )?),
+    };
+    Ok(Body { name, shape })
+}
+
+fn pack_points(points: &[Point]) -> Bytes {
+    let numbers = points.iter().flatten();
+    numbers.flat_map(|n| n.to_le_bytes()).collect()
+}
+
+fn unpack_points(bytes: &[u8]) -> Result<Vec<Point>> {
+    let [x, y, z] = [0, 8, 16];
+    let number = |b: &[u8; 24], at: usize| f64::from_le_bytes(std::array::from_fn(|i| b[at + i]));
+    let point = |b: &[u8; 24]| [number(b, x), number(b, y), number(b, z)];
+    unpack(bytes, "points", point)
+}
+
+fn pack_triangles(triangles: &[[u32; 3]]) -> Bytes {
+    let numbers = triangles.iter().flatten();
+    numbers.flat_map(|n| n.to_le_bytes()).collect()
+}
+
+fn unpack_triangles(bytes: &[u8]) -> Result<Vec<[u32; 3]>> {
+    let number = |b: &[u8; 12], at: usize| u32::from_le_bytes(std::array::from_fn(|i| b[at + i]));
+    let triangle = |b: &[u8; 12]| [number(b, 0), number(b, 4), number(b, 8)];
+    unpack(bytes, "triangles", triangle)
+}
+
+fn unpack<T, const N: usize>(
+    bytes: &[u8],
+    what: &'static str,
+    one: impl Fn(&[u8; N]) -> T,
+) -> Result<Vec<T>> {
+    let (all, rest) = bytes.as_chunks::<N>();
+    if rest.is_empty() {
+        Ok(all.iter().map(one).collect())
+    } else {
+        Err(Error::Ragged {
+            what,
+            bytes: bytes.len(),
+            size: N,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn job(cutter: Cutter) -> Job {
+        Job {
+            discretization: Discretization::Grid {
+                rows: 159,
+                columns: 120,
+            },
+            cutter,
+            motion: Motion {
+                kind: MotionKind::Rings,
+                step: 2.0,
+                points_per_revolution: 360,
+                from: None,
+                to: Some(12.5),
+            },
+            contact: Contact::Facet,
+            method: Method::Brute,
+        }
+    }
+
+    #[test]
+    fn jobs_survive_the_wire() {
+        for cutter in [
+            Cutter::torus(40.0, 8.0),
+            Cutter::cylinder(20.0, 6.0),
+            Cutter::cone(20.0, 6.0, 30.0),
+        ] {
+            let job = job(cutter.expect("valid"));
+            assert_eq!(job_from_wire(&job_to_wire(&job)), Ok(job));
+        }
+    }
+
+    #[test]
+    fn what_is_impossible_is_refused_on_arrival() {
+        let good = job_to_wire(&job(Cutter::ball(5.0).expect("valid")));
+        let negative = wire::Torus {
+            major_radius: -1.0,
+            minor_radius: 1.0,
+        };
+        let bad = wire::Job {
+            cutter: Some(wire::job::Cutter::Torus(negative)),
+            ..good
+        };
+        assert!(matches!(job_from_wire(&bad), Err(Error::Core(_))));
+        let bad = wire::Job { contact: 0, ..good };
+        assert!(matches!(job_from_wire(&bad), Err(Error::Missing { .. })));
+    }
+
+    #[test]
+    fn rows_and_bodies_survive_the_wire() {
+        let points = vec![[0.0, 1.0, -2.5], [1.0, 0.5, 3.0], [2.0, 0.0, 0.0]];
+        for kind in [
+            RowKind::Isoline { joins_next: true },
+            RowKind::Slab {
+                facets: vec![[0, 1, 2]],
+            },
+        ] {
+            let row = Row {
+                id: 7,
+                points: points.clone(),
+                kind,
+            };
+            assert_eq!(row_from_wire(&row_to_wire(&row)), Ok(row));
+        }
+        let mesh = Mesh::new("m", points, vec![[2, 1, 0]]).expect("valid");
+        let body = Body {
+            name: "m".to_owned(),
+            shape: Shape::Mesh(mesh),
+        };
+        assert_eq!(body_from_wire(body_to_wire(&body)), Ok(body));
+    }
+
+    #[test]
+    fn a_facet_beyond_its_row_is_refused() {
+        let row = wire::Row {
+            id: 0,
+            points: pack_points(&[[0.0; 3]; 2]),
+            kind: Some(wire::row::Kind::Slab(wire::Slab {
+                facets: pack_triangles(&[[0, 1, 2]]),
+            })),
+        };
+        assert!(matches!(row_from_wire(&row), Err(Error::Core(_))));
+    }
+}

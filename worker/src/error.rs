@@ -1,0 +1,44 @@
+//! Why a worker stops.
+
+use std::time::Duration;
+
+/// Everything that ends a worker but a request to stop.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The master's address cannot be one.
+    #[error("{address:?} is not an address of the form host:port")]
+    Address {
+        /// As given.
+        address: String,
+    },
+    /// The master never answered.
+    #[error("no master answered at {address} within {} s ({reason}); is it running, and reachable from here", waited.as_secs())]
+    NoMaster {
+        /// Where it was looked for.
+        address: String,
+        /// For how long.
+        waited: Duration,
+        /// The last error.
+        reason: String,
+    },
+    /// The master does not want this worker.
+    #[error("the master at {address} refuses this worker: {reason}")]
+    Refused {
+        /// Where it is.
+        address: String,
+        /// Its words.
+        reason: String,
+    },
+    /// The listener is gone.
+    #[error("the listening socket has no address: {0}")]
+    Listener(std::io::Error),
+    /// No threads.
+    #[error("cannot start threads: {0}")]
+    Threads(rayon::ThreadPoolBuildError),
+    /// The server stopped.
+    #[error("cannot serve: {0}")]
+    Serve(tonic::transport::Error),
+}
+
+/// The result of a worker's life.
+pub type Result<T> = std::result::Result<T, Error>;
