@@ -20,7 +20,7 @@ use crate::tree::{
 };
 
 /// Positions that one thread takes at a time.
-pub const CHUNK: u64 = 1024;
+const CHUNK: u64 = 256;
 
 /// Rows made ready to be searched.
 #[derive(Debug)]

@@ -11,7 +11,7 @@ use crate::job::Discretization;
 use crate::part::{Mesh, Part, Shape};
 use crate::record::BodyRecord;
 use crate::refine::refine;
-use crate::row::{Outline, Row, RowKind, outlines};
+use crate::row::{Facet, Outline, Row, RowKind, facets, outlines};
 use crate::surface::{Direction, Surface};
 use crate::vector::{Interval, Point};
 
@@ -31,6 +31,15 @@ pub struct Model {
     pub outlines: Vec<Outline>,
     /// What became of each body, in order.
     pub bodies: Vec<BodyRecord>,
+}
+
+impl Model {
+    /// Every facet by its corners, mm.
+    pub fn triangles(&self) -> Vec<[Point; 3]> {
+        let points: Vec<Point> = self.rows.iter().flat_map(|r| r.points.clone()).collect();
+        let triangle = |f: Facet| f.corners.map(|c| points[c as usize]);
+        facets(&self.rows).map(triangle).collect()
+    }
 }
 
 /// Makes the rows of every body.

@@ -39,7 +39,7 @@ mod path;
 mod record;
 
 pub use cutter::Cutter;
-pub use digitize::{CHUNK, Digitizer};
+pub use digitize::Digitizer;
 pub use discretize::{Model, discretize};
 pub use error::{Error, Result};
 pub use extent::Extent;

@@ -4,6 +4,8 @@
 //! number of divisions is found by measuring: the surface is sampled four times denser than the grid
 //! in both directions, and the deviation of a chord falls with the square of the divisions.
 
+use rayon::prelude::*;
+
 use crate::discretize::{Lines, MAX_LINES};
 use crate::error::{Error, Result};
 use crate::surface::{Direction, Surface};
@@ -83,6 +85,11 @@ impl Divisions {
         lines
     }
 
+    fn raise(&mut self, piece: usize, deviation: &Deviation) {
+        self.chord[piece] = self.chord[piece].max(deviation.chord);
+        self.facet[piece] = self.facet[piece].max(deviation.facet);
+    }
+
     /// The piece of each cell.
     fn pieces(&self) -> Vec<usize> {
         let cells = self.count.iter().enumerate();
@@ -122,36 +129,67 @@ fn measure(surface: &Surface, u: &mut Divisions, v: &mut Divisions) -> f64 {
     }
     let (us, vs) = (u.lines(DENSITY), v.lines(DENSITY));
     let (u_pieces, v_pieces) = (u.pieces(), v.pieces());
-    let mut worst = 0.0_f64;
     // One strip of cells at a time: the dense sampling is never held as a whole.
-    for (i, &u_piece) in u_pieces.iter().enumerate() {
-        let strip = surface.grid(&us[i * DENSITY..=(i + 1) * DENSITY], &vs);
-        for (j, &v_piece) in v_pieces.iter().enumerate() {
-            let at = |a: usize, b: usize| strip[a * vs.len() + j * DENSITY + b];
-            let (mut along_u, mut along_v, mut facet) = (0.0_f64, 0.0_f64, 0.0_f64);
-            for a in 0..=DENSITY {
-                for b in 0..=DENSITY {
-                    let p = at(a, b);
-                    along_u = along_u.max(to_chord(p, at(0, b), at(DENSITY, b)));
-                    along_v = along_v.max(to_chord(p, at(a, 0), at(a, DENSITY)));
-                    // The two facets of the cell share the diagonal from (0, 0); a sample is held
-                    // against the one that its parameters fall into.
-                    let third = if a > b {
-                        at(DENSITY, 0)
-                    } else {
-                        at(0, DENSITY)
-                    };
-                    facet = facet.max(to_triangle(p, at(0, 0), third, at(DENSITY, DENSITY)));
-                }
+    let strips: Vec<(Deviation, Vec<Deviation>)> = (0..u_pieces.len())
+        .into_par_iter()
+        .map(|i| {
+            let strip = surface.grid(&us[i * DENSITY..=(i + 1) * DENSITY], &vs);
+            let mut along = Deviation::default();
+            let mut across = vec![Deviation::default(); v.count.len()];
+            for (j, &v_piece) in v_pieces.iter().enumerate() {
+                let cell = |a: usize, b: usize| strip[a * vs.len() + j * DENSITY + b];
+                let (along_u, along_v, facet) = measure_cell(cell);
+                along.raise(along_u, facet);
+                across[v_piece].raise(along_v, facet);
             }
-            u.chord[u_piece] = u.chord[u_piece].max(along_u);
-            v.chord[v_piece] = v.chord[v_piece].max(along_v);
-            u.facet[u_piece] = u.facet[u_piece].max(facet);
-            v.facet[v_piece] = v.facet[v_piece].max(facet);
-            worst = worst.max(facet);
+            (along, across)
+        })
+        .collect();
+    let mut worst = 0.0_f64;
+    for (&u_piece, (along, across)) in u_pieces.iter().zip(&strips) {
+        u.raise(u_piece, along);
+        for (piece, deviation) in across.iter().enumerate() {
+            v.raise(piece, deviation);
         }
+        worst = worst.max(along.facet);
     }
     worst
+}
+
+/// Largest deviations, mm.
+#[derive(Clone, Copy, Default)]
+struct Deviation {
+    chord: f64,
+    facet: f64,
+}
+
+impl Deviation {
+    fn raise(&mut self, chord: f64, facet: f64) {
+        self.chord = self.chord.max(chord);
+        self.facet = self.facet.max(facet);
+    }
+}
+
+/// Deviations of the chords along u, of those along v, and of the two facets of a cell, given its
+/// samples.
+fn measure_cell(at: impl Fn(usize, usize) -> Point) -> (f64, f64, f64) {
+    let (mut along_u, mut along_v, mut facet) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for a in 0..=DENSITY {
+        for b in 0..=DENSITY {
+            let p = at(a, b);
+            along_u = along_u.max(to_chord(p, at(0, b), at(DENSITY, b)));
+            along_v = along_v.max(to_chord(p, at(a, 0), at(a, DENSITY)));
+            // The facets share the diagonal from (0, 0); a sample is held against the one that its
+            // parameters fall into.
+            let third = if a > b {
+                at(DENSITY, 0)
+            } else {
+                at(0, DENSITY)
+            };
+            facet = facet.max(to_triangle(p, at(0, 0), third, at(DENSITY, DENSITY)));
+        }
+    }
+    (along_u, along_v, facet)
 }
 
 /// Distance from `p` to the segment from `a` to `b`.

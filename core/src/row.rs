@@ -79,6 +79,46 @@ impl Row {
     }
 }
 
+/// A facet, by the rows that are at hand.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Facet {
+    /// Place of its row among them.
+    pub row: usize,
+    /// Its number in that row.
+    pub number: usize,
+    /// Its corners, as indices into the points of all of them, one row after the other.
+    pub corners: [u32; 3],
+}
+
+/// The facets of rows that are in order of their ids; between isolines only where both are there.
+pub(crate) fn facets(rows: &[Row]) -> impl Iterator<Item = Facet> {
+    let starts = rows.iter().scan(0u32, |sum, row| {
+        let start = *sum;
+        *sum += row.points.len() as u32;
+        Some(start)
+    });
+    starts.enumerate().flat_map(move |(i, start)| {
+        let row = &rows[i];
+        let next = rows.get(i + 1).filter(|next| next.id == row.id + 1);
+        let (slab, columns) = match (&row.kind, next) {
+            (RowKind::Slab { facets }, _) => (&facets[..], 0),
+            (RowKind::Isoline { joins_next: true }, Some(_)) => (&[][..], row.points.len() as u32),
+            (RowKind::Isoline { .. }, _) => (&[][..], 0),
+        };
+        let own = slab.iter().map(move |f| f.map(|c| start + c));
+        let between = (1..columns).flat_map(move |k| {
+            let (a, b) = (start + k, start + columns + k);
+            [[a - 1, b - 1, b], [a - 1, b, a]]
+        });
+        let all = own.chain(between).enumerate();
+        all.map(move |(number, corners)| Facet {
+            row: i,
+            number,
+            corners,
+        })
+    })
+}
+
 /// The outlines of a body's rows, which must be complete and in order.
 pub(crate) fn outlines(rows: &[Row]) -> Vec<Outline> {
     let outline = |(i, row): (usize, &Row)| {

@@ -10,7 +10,7 @@ use crate::contact::{Pose, touch_facet, touch_point};
 use crate::cutter::Cutter;
 use crate::path::Touch;
 use crate::record::Counters;
-use crate::row::{Row, RowKind};
+use crate::row::{Facet, Row, facets};
 use crate::vector::{Interval, Point};
 
 /// Candidates in a leaf.
@@ -83,37 +83,14 @@ pub(crate) fn point_candidates(rows: &[Row]) -> (Vec<Point>, Vec<PointCandidate>
     (points, candidates)
 }
 
-/// All facets of the rows, which are in order of their ids; facets between isolines only where both
-/// rows are there.
+/// All facets of the rows, which are in order of their ids.
 pub(crate) fn facet_candidates(rows: &[Row]) -> (Vec<Point>, Vec<FacetCandidate>) {
     let points = rows.iter().flat_map(|r| r.points.iter().copied()).collect();
-    let mut candidates = Vec::new();
-    let mut start = 0u32;
-    for (i, row) in rows.iter().enumerate() {
-        let columns = row.points.len() as u32;
-        let next = rows.get(i + 1).filter(|next| next.id == row.id + 1);
-        match (&row.kind, next) {
-            (RowKind::Slab { facets }, _) => {
-                candidates.extend(facets.iter().enumerate().map(|(k, f)| FacetCandidate {
-                    id: number(row, k),
-                    corners: f.map(|c| start + c),
-                }));
-            }
-            (RowKind::Isoline { joins_next: true }, Some(_)) => {
-                for k in 0..columns.saturating_sub(1) {
-                    let (a, b) = (start + k, start + columns + k);
-                    let quad = [[a, b, b + 1], [a, b + 1, a + 1]];
-                    candidates.extend((0..).zip(quad).map(|(half, corners)| FacetCandidate {
-                        id: number(row, 2 * k as usize + half),
-                        corners,
-                    }));
-                }
-            }
-            (RowKind::Isoline { .. }, _) => {}
-        }
-        start += columns;
-    }
-    (points, candidates)
+    let candidate = |f: Facet| FacetCandidate {
+        id: number(&rows[f.row], f.number),
+        corners: f.corners,
+    };
+    (points, facets(rows).map(candidate).collect())
 }
 
 /// The number of a row's `i`-th candidate in the part.

@@ -110,7 +110,9 @@ impl Data {
         let edge_loop = self.add(format_args!("EDGE_LOOP('',{})", list(&uses)));
         let bound = self.add(format_args!("FACE_OUTER_BOUND('',{edge_loop},.T.)"));
         let geometry = self.surface(name, surface);
-        self.add(format_args!("ADVANCED_FACE({name},({bound}),{geometry},.T.)"))
+        self.add(format_args!(
+            "ADVANCED_FACE({name},({bound}),{geometry},.T.)"
+        ))
     }
 
     fn edge(&mut self, side: &Side, along: &Direction, vertices: &mut Vec<(Point, Id)>) -> Id {
@@ -154,7 +156,9 @@ impl Data {
         );
         let knots = format!("{u_many},{v_many},{u_knots},{v_knots},.UNSPECIFIED.");
         match surface.weights() {
-            None => self.add(format_args!("B_SPLINE_SURFACE_WITH_KNOTS({name},{shape},{knots})")),
+            None => self.add(format_args!(
+                "B_SPLINE_SURFACE_WITH_KNOTS({name},{shape},{knots})"
+            )),
             Some(weights) => {
                 let weights: Vec<String> = weights.chunks_exact(v.count()).map(reals).collect();
                 self.add(format_args!(
@@ -170,19 +174,27 @@ impl Data {
     /// The product that the schema wants around a shape, and its units.
     fn product(&mut self, name: &str, items: &[Id]) {
         let name = quoted(name);
-        let application = self.add(
-            "APPLICATION_CONTEXT('core data for automotive mechanical design processes')",
-        );
+        let application =
+            self.add("APPLICATION_CONTEXT('core data for automotive mechanical design processes')");
         self.add(format_args!(
             "APPLICATION_PROTOCOL_DEFINITION('international standard','automotive_design',2000,{application})"
         ));
-        let context = self.add(format_args!("PRODUCT_CONTEXT('',{application},'mechanical')"));
+        let context = self.add(format_args!(
+            "PRODUCT_CONTEXT('',{application},'mechanical')"
+        ));
         let product = self.add(format_args!("PRODUCT({name},{name},'',({context}))"));
-        self.add(format_args!("PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,({product}))"));
-        let version = self.add(format_args!("PRODUCT_DEFINITION_FORMATION('','',{product})"));
-        let stage =
-            self.add(format_args!("PRODUCT_DEFINITION_CONTEXT('part definition',{application},'design')"));
-        let definition = self.add(format_args!("PRODUCT_DEFINITION('design','',{version},{stage})"));
+        self.add(format_args!(
+            "PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,({product}))"
+        ));
+        let version = self.add(format_args!(
+            "PRODUCT_DEFINITION_FORMATION('','',{product})"
+        ));
+        let stage = self.add(format_args!(
+            "PRODUCT_DEFINITION_CONTEXT('part definition',{application},'design')"
+        ));
+        let definition = self.add(format_args!(
+            "PRODUCT_DEFINITION('design','',{version},{stage})"
+        ));
         let shape = self.add(format_args!("PRODUCT_DEFINITION_SHAPE('','',{definition})"));
         let length = self.add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))");
         let angle = self.add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))");
@@ -198,7 +210,9 @@ impl Data {
             "MANIFOLD_SURFACE_SHAPE_REPRESENTATION({name},{},{space})",
             list(items)
         ));
-        self.add(format_args!("SHAPE_DEFINITION_REPRESENTATION({shape},{representation})"));
+        self.add(format_args!(
+            "SHAPE_DEFINITION_REPRESENTATION({shape},{representation})"
+        ));
     }
 }
 
@@ -213,9 +227,10 @@ fn list<T: Display>(items: &[T]) -> String {
     let mut text = String::from("(");
     for (i, item) in items.iter().enumerate() {
         // Lines stay short enough for editors, and for readers with a buffer.
+        let line = text.len() - text.rfind('\n').map_or(0, |end| end + 1);
         let separator = match i {
             0 => "",
-            _ if i % 16 == 0 => ",\n",
+            _ if line > 72 => ",\n",
             _ => ",",
         };
         let _ = write!(text, "{separator}{item}");

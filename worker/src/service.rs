@@ -149,6 +149,7 @@ fn digitize(
     let begin = Instant::now();
     let positions = task.first..task.first + task.count;
     let counters = digitizer.run_chunks(&task.trajectory, positions, |first, touches| {
+        debug!(id = %task.id, first, count = touches.len(), "positions");
         let positions = horma_proto::pack_positions(first, &touches);
         !shutdown.is_cancelled() && send(Reply::Positions(positions))
     });

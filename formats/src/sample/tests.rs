@@ -7,7 +7,9 @@ use super::*;
 use crate::{job, part};
 
 fn example(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../examples/last").join(name)
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("../examples/last")
+        .join(name)
 }
 
 fn surfaces(style: &LastStyle) -> Vec<Surface> {
@@ -27,7 +29,10 @@ fn dense(surface: &Surface, rows: usize, columns: usize) -> Vec<Vec<Point>> {
     let us = over(surface.u().domain(), rows);
     let vs = over(surface.v().domain(), columns);
     let points = surface.grid(&us, &vs);
-    points.chunks_exact(columns).map(<[Point]>::to_vec).collect()
+    points
+        .chunks_exact(columns)
+        .map(<[Point]>::to_vec)
+        .collect()
 }
 
 /// What a last maker would measure, mm.
@@ -40,7 +45,9 @@ fn measures(style: &LastStyle) -> [f64; 4] {
     let all: Vec<Point> = rows.concat();
     let width = |row: &Vec<Point>| extent(row, 1);
     let ball = rows.iter().map(width).fold(0.0, f64::max);
-    let waist = rows.iter().filter(|r| (0.25..0.55).contains(&(r[0][0] / style.length)));
+    let waist = rows
+        .iter()
+        .filter(|r| (0.25..0.55).contains(&(r[0][0] / style.length)));
     let waist = waist.map(width).fold(f64::INFINITY, f64::min);
     let cone = rows.iter().map(|row| extent(row, 2)).fold(0.0, f64::max);
     [extent(&all, 0), ball, waist, cone]
@@ -59,7 +66,8 @@ fn the_styles_measure_what_they_state() {
 
 #[test]
 fn it_is_smooth_and_turned_outwards() {
-    for surface in surfaces(&LastStyle::WOMEN) {
+    let styles = [LastStyle::WOMEN, LastStyle::MEN];
+    for surface in styles.iter().flat_map(surfaces) {
         let rows = dense(&surface, 200, 200);
         let normal = |i: usize, j: usize| {
             let along = sub(rows[i + 1][j], rows[i][j]);
@@ -67,11 +75,9 @@ fn it_is_smooth_and_turned_outwards() {
             let n = cross(along, around);
             n.map(|c| c / length(n))
         };
-        let end = (surface.u().domain(), surface.v().domain());
-        assert_eq!(rows[50][0], rows[50][199], "closed in {:?}", end.1);
-        for i in 1..199 {
-            for j in 1..199 {
-                let p = rows[i][j];
+        assert!(rows.iter().all(|row| row[0] == row[199]), "v is closed");
+        for (i, row) in rows.iter().enumerate().take(199).skip(1) {
+            for (j, &p) in row.iter().enumerate().take(199).skip(1) {
                 // A section may be hollow, but nowhere does the surface turn its back on the spindle.
                 let n = normal(i, j);
                 let outwards = n[1] * p[1] + n[2] * p[2];
@@ -89,6 +95,12 @@ fn the_holders_enter_the_last() {
     let x = |s: &Surface| Interval::of(s.poles().iter().map(|p| p[0]));
     assert!(x(&heel).low < x(&last).low && x(&last).low < x(&heel).high);
     assert!(x(&toe).low < x(&last).high && x(&last).high < x(&toe).high);
+    // The slits that the last leaves at its ends are inside them.
+    let ends = dense(&last, 2, 200);
+    for (end, (_, width, height)) in ends.iter().zip([HEEL_HOLDER[1], TOE_HOLDER[1]]) {
+        let inside = |p: &Point| (p[1] / width).hypot(p[2] / height) < 1.0;
+        assert!(end.iter().all(inside));
+    }
 }
 
 #[test]
@@ -116,7 +128,11 @@ fn the_example_reads_back_pole_for_pole() {
     assert_eq!(loaded.bodies.len(), expected.len());
     for (body, original) in loaded.bodies.iter().zip(expected) {
         assert!(body.shape == original.shape, "{}", body.name);
-        assert!(body.name.contains(&format!("'{}'", original.name)), "{}", body.name);
+        assert!(
+            body.name.contains(&format!("'{}'", original.name)),
+            "{}",
+            body.name
+        );
     }
 }
 
@@ -132,7 +148,10 @@ fn nothing_is_overwritten() {
     let dir = tempfile::tempdir().expect("a scratch directory");
     let inside = dir.path().join("new/sample");
     write_sample(&inside).expect("written");
-    assert_eq!(fs::read_to_string(inside.join(JOB)).expect("there"), job_toml());
+    assert_eq!(
+        fs::read_to_string(inside.join(JOB)).expect("there"),
+        job_toml()
+    );
     fs::remove_file(inside.join(PART)).expect("removed");
     fs::write(inside.join(JOB), "mine").expect("written");
     let error = write_sample(&inside).expect_err("the job is there");

@@ -55,7 +55,11 @@ fn open_surfaces_read_back_as_the_same_numbers() {
 #[test]
 fn seams_and_collapsed_sides_read_back() {
     let closed = surface(4, 5, false, |i, j| {
-        [i as f64, [0.0, 2.0, 3.0, -2.0, 0.0][j], [0.0, 0.0, 2.0, 2.0, 0.0][j]]
+        [
+            i as f64,
+            [0.0, 2.0, 3.0, -2.0, 0.0][j],
+            [0.0, 0.0, 2.0, 2.0, 0.0][j],
+        ]
     });
     let pointed = surface(4, 4, false, |i, j| {
         [i as f64, (i * j) as f64, (i * (3 - j)) as f64]

@@ -1,0 +1,210 @@
+//! What the tests share: the real binary, jobs to give it, and processes that are waited for by what
+//! they say and never by the clock.
+
+#![allow(dead_code)] // Each test binary uses its part of this.
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+/// Far longer than anything takes: a test that waits this long has failed.
+const DEADLINE: Duration = Duration::from_secs(120);
+
+/// The binary, without the caller's settings.
+pub fn horma() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_horma"));
+    for (name, _) in std::env::vars_os() {
+        if name.to_string_lossy().starts_with("HORMA_") {
+            command.env_remove(name);
+        }
+    }
+    command.stdin(Stdio::null());
+    command
+}
+
+/// Runs the binary to its end.
+pub fn run(args: &[&str]) -> Output {
+    horma().args(args).output().expect("the binary starts")
+}
+
+/// Runs the binary to a good end.
+pub fn succeed(args: &[&str]) -> String {
+    let output = run(args);
+    let (out, err) = texts(&output);
+    assert!(output.status.success(), "horma {args:?}\n{out}{err}");
+    out
+}
+
+/// Standard output and standard error.
+pub fn texts(output: &Output) -> (String, String) {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (text(&output.stdout), text(&output.stderr))
+}
+
+/// A scratch directory.
+pub fn scratch() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a scratch directory")
+}
+
+/// A path as an argument.
+pub fn text(path: &Path) -> &str {
+    path.to_str().expect("a UTF-8 path")
+}
+
+/// The sample job.
+pub fn sample() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/last/job.toml")
+}
+
+/// A file of the test data that lies beside the project on some machines; says so if it is missing.
+pub fn data(name: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(name);
+    if path.exists() {
+        return path.canonicalize().ok();
+    }
+    eprintln!("skipped: no {} here", path.display());
+    None
+}
+
+/// A job file over `files`, each line of `more` a table or a key.
+pub fn job(dir: &Path, name: &str, files: &[&Path], more: &str) -> PathBuf {
+    let files: Vec<String> = files.iter().map(|f| format!("{f:?}")).collect();
+    let job = dir.join(name);
+    let text = format!("[part]\nfiles = [{}]\n{more}", files.join(", "));
+    std::fs::write(&job, text).expect("writable");
+    job
+}
+
+/// `path.csv` of a run of `job` with more arguments.
+pub fn path_of(job: &Path, dir: &Path, name: &str, args: &[&str]) -> Vec<u8> {
+    let out = dir.join(name);
+    let mut all = vec!["run", text(job), "-o", text(&out), "--quiet"];
+    all.extend(args);
+    succeed(&all);
+    std::fs::read(out.join("path.csv")).expect("a path")
+}
+
+/// `report.json` of a directory.
+pub fn report(dir: &Path) -> serde_json::Value {
+    let text = std::fs::read(dir.join("report.json")).expect("a report");
+    serde_json::from_slice(&text).expect("JSON")
+}
+
+/// A process whose lines, of both its outputs, are waited for. Killed when dropped.
+pub struct Process {
+    pub child: Child,
+    name: String,
+    lines: Receiver<String>,
+    seen: Vec<String>,
+}
+
+impl Process {
+    pub fn start(name: &str, args: &[&str], log: &str) -> Self {
+        let mut command = horma();
+        command.args(args).env("HORMA_LOG", log);
+        let spawned = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+        let mut child = spawned.expect("the binary starts");
+        let (sender, lines) = channel();
+        let outputs: [Box<dyn std::io::Read + Send>; 2] = [
+            Box::new(child.stdout.take().expect("piped")),
+            Box::new(child.stderr.take().expect("piped")),
+        ];
+        for output in outputs {
+            let sender = sender.clone();
+            std::thread::spawn(move || {
+                for line in BufReader::new(output).lines().map_while(Result::ok) {
+                    if sender.send(line).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        Self {
+            child,
+            name: name.to_owned(),
+            lines,
+            seen: Vec::new(),
+        }
+    }
+
+    /// Waits for a line that contains all of `words`, which may have come already.
+    pub fn wait_for(&mut self, words: &[&str]) -> String {
+        let has = |line: &String| words.iter().all(|w| line.contains(w));
+        if let Some(line) = self.seen.iter().find(|l| has(l)) {
+            return line.clone();
+        }
+        let begin = Instant::now();
+        loop {
+            match self.lines.recv_timeout(DEADLINE.saturating_sub(begin.elapsed())) {
+                Ok(line) => {
+                    self.seen.push(line.clone());
+                    if has(&line) {
+                        return line;
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => panic!("{words:?} never came\n{}", self.log()),
+                Err(RecvTimeoutError::Disconnected) => {
+                    panic!("{} ended before it said {words:?}\n{}", self.name, self.log())
+                }
+            }
+        }
+    }
+
+    /// Waits for the end; returns the exit code and everything that was said.
+    pub fn end(mut self) -> (Option<i32>, String) {
+        let begin = Instant::now();
+        // Both outputs close when the process ends.
+        loop {
+            match self.lines.recv_timeout(DEADLINE.saturating_sub(begin.elapsed())) {
+                Ok(line) => self.seen.push(line),
+                Err(RecvTimeoutError::Disconnected) => break,
+                Err(RecvTimeoutError::Timeout) => panic!("it does not end\n{}", self.log()),
+            }
+        }
+        let status = self.child.wait().expect("its end");
+        (status.code(), self.log())
+    }
+
+    /// Sends a signal by its name.
+    pub fn signal(&self, signal: &str) {
+        let pid = self.child.id().to_string();
+        let status = Command::new("kill").args([signal, &pid]).status();
+        assert!(status.expect("kill exists").success());
+    }
+
+    fn log(&self) -> String {
+        let lines = self.seen.iter().map(|l| format!("{}: {l}\n", self.name));
+        lines.collect()
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        if std::thread::panicking() {
+            eprint!("{}", self.log());
+        }
+    }
+}
+
+/// A master on a port of the system's choice, and its address.
+pub fn master(more: &[&str]) -> (Process, String) {
+    let mut args = vec!["master", "--bind", "127.0.0.1:0"];
+    args.extend(more);
+    let mut process = Process::start("master", &args, "info");
+    let line = process.wait_for(&["listening on"]);
+    let address = line.rsplit(' ').next().expect("a word").to_owned();
+    (process, address)
+}
+
+/// A worker of that master, once it is registered.
+pub fn worker(master: &str, id: &str) -> Process {
+    let args = ["worker", "--master", master, "--id", id, "--threads", "1"];
+    let mut process = Process::start(id, &args, "debug");
+    process.wait_for(&["registered"]);
+    process
+}
