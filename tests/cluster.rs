@@ -41,7 +41,10 @@ fn surfaces_are_the_same_on_any_number_of_workers() {
         return;
     };
     let dir = scratch();
-    check_workers(&job(dir.path(), "job.toml", &[&part], LAST), &[1, 2, 3, 5, 8]);
+    check_workers(
+        &job(dir.path(), "job.toml", &[&part], LAST),
+        &[1, 2, 3, 5, 8],
+    );
 }
 
 #[test]
@@ -50,7 +53,10 @@ fn a_mesh_is_the_same_on_any_number_of_workers() {
         return;
     };
     let dir = scratch();
-    check_workers(&job(dir.path(), "job.toml", &[&part], LAST), &[1, 2, 3, 5, 8]);
+    check_workers(
+        &job(dir.path(), "job.toml", &[&part], LAST),
+        &[1, 2, 3, 5, 8],
+    );
 }
 
 /// Every cutter, motion and contact, on extents narrower than the cutter, against brute force.
@@ -93,7 +99,9 @@ fn a_part_of_several_files_is_one_part() {
     let both = job(dir.path(), "both.toml", &[&part, &sample], coarse);
     let alone = path_of(&both, dir.path(), "alone", &[]);
     assert!(alone == path_of(&both, dir.path(), "three", &["-w", "3"]));
-    let bodies = report(&dir.path().join("alone"))["bodies"].as_array().map(Vec::len);
+    let bodies = report(&dir.path().join("alone"))["bodies"]
+        .as_array()
+        .map(Vec::len);
     assert_eq!(bodies, Some(4), "one mesh and three surfaces");
 }
 
@@ -106,7 +114,15 @@ fn a_cluster_made_by_hand_gives_the_same_bytes() {
     for name in ["first", "second"] {
         let out = dir.path().join(name);
         let sample = sample();
-        succeed(&["submit", text(&sample), "--master", &address, "-o", text(&out), "-q"]);
+        succeed(&[
+            "submit",
+            text(&sample),
+            "--master",
+            &address,
+            "-o",
+            text(&out),
+            "-q",
+        ]);
         assert!(std::fs::read(out.join("path.csv")).expect("a path") == alone);
         let report = report(&out);
         let workers: Vec<_> = report["workers"]

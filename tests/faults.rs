@@ -51,7 +51,10 @@ fn a_worker_killed_while_it_computes_costs_no_byte() {
     let lost = &report["lost"].as_array().expect("lost attempts")[0];
     assert_eq!(lost["worker"], "victim");
     let (had, all) = (&lost["positions_received"], &lost["positions"]);
-    assert!(had.as_u64() < all.as_u64(), "it was killed before it was done: {lost}");
+    assert!(
+        had.as_u64() < all.as_u64(),
+        "it was killed before it was done: {lost}"
+    );
     let extents = report["extents"].as_array().expect("extents");
     assert!(extents.iter().all(|e| e["worker"] == "other"));
     assert!(extents.iter().any(|e| e["attempt"] == 2));
@@ -85,17 +88,29 @@ fn kill_local_worker(parent: u32, id: &str) {
         let arguments = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
         arguments.split(|b| *b == 0).any(|a| a == id.as_bytes())
     };
-    let pid = pids.iter().find(is_it).expect("the worker runs").to_string();
-    let killed = std::process::Command::new("kill").args(["-9", &pid]).status();
+    let pid = pids
+        .iter()
+        .find(is_it)
+        .expect("the worker runs")
+        .to_string();
+    let killed = std::process::Command::new("kill")
+        .args(["-9", &pid])
+        .status();
     assert!(killed.expect("kill exists").success());
 }
 
 /// Children of a process, of all its threads.
 fn children(parent: u32) -> Vec<u32> {
-    let tasks = std::fs::read_dir(format!("/proc/{parent}/task")).into_iter().flatten();
-    let lists = tasks.flatten().map(|t| std::fs::read_to_string(t.path().join("children")));
+    let tasks = std::fs::read_dir(format!("/proc/{parent}/task"))
+        .into_iter()
+        .flatten();
+    let lists = tasks
+        .flatten()
+        .map(|t| std::fs::read_to_string(t.path().join("children")));
     let all: String = lists.map(Result::unwrap_or_default).collect();
-    all.split_whitespace().filter_map(|pid| pid.parse().ok()).collect()
+    all.split_whitespace()
+        .filter_map(|pid| pid.parse().ok())
+        .collect()
 }
 
 #[test]
@@ -110,7 +125,10 @@ fn a_job_fails_when_nobody_is_left_and_leaves_nothing_behind() {
     victim.child.kill().expect("alive");
     let (code, log) = client.end();
     assert_eq!(code, Some(4), "{log}");
-    assert!(log.contains("no worker is left") && log.contains("victim"), "{log}");
+    assert!(
+        log.contains("no worker is left") && log.contains("victim"),
+        "{log}"
+    );
     assert_eq!(std::fs::read_dir(&out).expect("there").count(), 0);
 }
 
@@ -141,7 +159,10 @@ fn an_interrupt_stops_a_run_and_its_workers() {
         for child in children {
             let state = std::fs::read_to_string(format!("/proc/{child}/stat"));
             // An orphan that nobody has reaped yet has ended as well.
-            assert!(state.is_err() || state.is_ok_and(|s| s.contains(") Z ")), "{child} lives on");
+            assert!(
+                state.is_err() || state.is_ok_and(|s| s.contains(") Z ")),
+                "{child} lives on"
+            );
         }
         assert_eq!(std::fs::read_dir(&out).expect("there").count(), 0);
     }
@@ -178,7 +199,9 @@ async fn lie(master: &str, id: &str, how: fn(wire::Task) -> DigitizeReply) {
         .add_service(WorkerServer::new(Liar(how)))
         .serve_with_incoming(TcpListenerStream::new(listener));
     tokio::spawn(server);
-    register(master, id, horma_proto::VERSION, address).await.expect("welcome");
+    register(master, id, horma_proto::VERSION, address)
+        .await
+        .expect("welcome");
 }
 
 async fn register(
@@ -187,7 +210,9 @@ async fn register(
     version: &str,
     address: String,
 ) -> Result<Response<wire::RegisterReply>, Status> {
-    let mut client = MasterClient::connect(format!("http://{master}")).await.expect("serves");
+    let mut client = MasterClient::connect(format!("http://{master}"))
+        .await
+        .expect("serves");
     let request = RegisterRequest {
         version: version.to_owned(),
         worker: id.to_owned(),
@@ -248,10 +273,16 @@ async fn workers_that_answer_wrongly_are_found_out() {
         let lost = &report["lost"].as_array().expect("lost attempts")[0];
         assert_eq!(lost["worker"], "a liar");
         let reason = lost["reason"].as_str().expect("a reason");
-        assert!(reason.contains("wrong") && reason.contains(found), "{reason}");
+        assert!(
+            reason.contains("wrong") && reason.contains(found),
+            "{reason}"
+        );
         // Until it starts anew it is not trusted again.
         let again = register(&address, "a liar", horma_proto::VERSION, address.clone()).await;
-        assert_eq!(again.expect_err("refused").code(), tonic::Code::PermissionDenied);
+        assert_eq!(
+            again.expect_err("refused").code(),
+            tonic::Code::PermissionDenied
+        );
     }
 }
 
@@ -267,7 +298,15 @@ async fn a_worker_of_another_version_is_refused() {
 #[test]
 fn a_worker_outlives_a_restart_of_its_master_and_stops_when_it_is_gone_for_good() {
     let (first, address) = master(&["--lease", "1"]);
-    let args = ["worker", "--master", &address, "--id", "w", "--patience", "2"];
+    let args = [
+        "worker",
+        "--master",
+        &address,
+        "--id",
+        "w",
+        "--patience",
+        "2",
+    ];
     let mut worker = Process::start("w", &args, "info");
     worker.wait_for(&["registered"]);
     drop(first);
@@ -277,5 +316,9 @@ fn a_worker_outlives_a_restart_of_its_master_and_stops_when_it_is_gone_for_good(
     second.wait_for(&["registered", "w"]);
     drop(second);
     let (code, log) = worker.end();
-    assert_eq!(code, Some(0), "there was a master, so the work is over: {log}");
+    assert_eq!(
+        code,
+        Some(0),
+        "there was a master, so the work is over: {log}"
+    );
 }

@@ -82,7 +82,7 @@ fn perform(
         ("cutter", &described(&echo["cutter"])),
     ];
     gcode::save(&dir.join(output::PROGRAM), &path, file.program, &heading)?;
-    //preview::save(&dir.join(output::PREVIEW), &part, &path)?;
+    preview::save(&dir.join(output::PREVIEW), &part, &path)?;
     record.phases.push(phase("write", begin));
     let report = Report {
         version: VERSION.to_owned(),

@@ -1,261 +1,123 @@
-//! Pictures: the part, shaded, with the tool path drawn over it.
+//! Pictures: the part, shaded, with the tool path around it.
 //!
-//! An orthographic view from the side, above and ahead, on the CPU alone. It is a picture to look
-//! at, not one to measure from: nothing is computed from it.
+//! It is a picture to look at, not one to measure from: nothing is computed from it.
 
-use horma_core::{Interval, Point, cross, dot, length, sub, unit};
-use tiny_skia::{LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke, Transform};
+mod render;
 
-/// Size of the picture, pixels.
-pub const SIZE: (u32, u32) = (1600, 1000);
+use std::io::Write;
+use std::path::Path;
 
-/// A red, green and blue.
-pub type Colour = [u8; 3];
+use horma_core::{Discretization, Interval, Part, Point, Shape, ToolPath, Touch, discretize};
 
-/// Where the cutter touches.
+use crate::error::Result;
+use crate::output;
+
+pub use render::{Colour, Polyline, SIZE, png};
+
+/// Colour of the line along which the cutter touches.
 pub const CONTACT: Colour = [13, 71, 161];
-/// Where the tool centre runs.
+/// Colour of the line along which the tool centre runs.
 pub const CENTRE: Colour = [206, 112, 76];
 
-/// A line over the part; it is interrupted at each `None`.
-#[derive(Debug, Clone, Copy)]
-pub struct Polyline<'a> {
-    /// Its points, mm.
-    pub points: &'a [Option<Point>],
-    /// Its colour.
-    pub colour: Colour,
-    /// Its width, pixels.
-    pub width: f32,
+/// Chordal tolerance of a picture, of the length of the part: a fraction of a pixel.
+const TOLERANCE: f64 = 2.5e-4;
+
+/// Writes a picture of `part`, which lies as it is on the lathe, and of `path` around it.
+///
+/// # Errors
+/// [`crate::Error::Io`], naming `file`; those of [`discretize`].
+pub fn save(file: &Path, part: &Part, path: &ToolPath) -> Result<()> {
+    let length = length(part);
+    let tolerance = Discretization::Tolerance((TOLERANCE * length).max(1.0e-3));
+    let triangles = discretize(part, tolerance)?.triangles();
+    let touches = || path.touches.iter();
+    let contact: Vec<_> = touches().map(|t| t.map(|t| t.contact)).collect();
+    let centre = centres(path);
+    let lines = [
+        Polyline {
+            points: &contact,
+            colour: CONTACT,
+            width: 1.0,
+        },
+        Polyline {
+            points: &centre,
+            colour: CENTRE,
+            width: 0.8,
+        },
+    ];
+    let picture = png(&triangles, &lines);
+    output::write(file, |file| file.write_all(&picture))
 }
 
-/// Colour of the part: beech.
-const BEECH: [f64; 3] = [222.0, 184.0, 135.0];
-/// Background, at the top and at the bottom.
-const BACKGROUND: [[f64; 3]; 2] = [[250.0, 251.0, 252.0], [226.0, 230.0, 234.0]];
-/// Towards the viewer, in the part's axes; z is up.
-const VIEWER: Point = [0.42, -0.78, 0.46];
-/// Towards the light, in the picture's axes: right, up, and out of it.
-const LIGHT: Point = [-0.38, 0.62, 0.69];
-/// Samples along each side of a pixel.
-const SAMPLES: usize = 2;
-/// Part of the picture's width and height that is left free around the part.
-const MARGIN: f64 = 0.05;
-/// A piece of a line this many times longer than the mean one is a jump, as where a cutter bridges a
-/// hollow and its contact changes sides: it is not drawn.
-const JUMP: f64 = 8.0;
-/// A line is hidden only by what lies this much nearer, mm: the chords of a path dip into the part.
-const SUNK: f64 = 0.35;
-
-/// The part's triangles with the lines over them, as a PNG file of [`SIZE`]. Lines are drawn in
-/// order and are hidden where the part is in front of them. What is not finite is left out.
-pub fn png(triangles: &[[Point; 3]], lines: &[Polyline]) -> Vec<u8> {
-    let view = View::new(triangles, lines);
-    let canvas = Canvas::new(&view, triangles);
-    let mut picture = canvas.resolve();
-    for line in lines {
-        stroke(&mut picture, &view, &canvas, line);
-    }
-    let png = picture.encode_png();
-    png.expect("a picture of this size can be encoded in memory")
+/// Extent of the part along the spindle, mm.
+fn length(part: &Part) -> f64 {
+    let points = part.bodies.iter().flat_map(|body| match &body.shape {
+        Shape::Surface(surface) => surface.poles(),
+        Shape::Mesh(mesh) => mesh.vertices(),
+    });
+    let x = Interval::of(points.map(|p| p[0]));
+    x.high - x.low
 }
 
-/// From the part to the samples of the picture.
-struct View {
-    right: Point,
-    up: Point,
-    out: Point,
-    scale: f64,
-    /// What is added once it is scaled: samples.
-    shift: [f64; 2],
-}
-
-impl View {
-    /// The view in which everything fits.
-    fn new(triangles: &[[Point; 3]], lines: &[Polyline]) -> Self {
-        let z = [0.0, 0.0, 1.0];
-        let out = unit(VIEWER).expect("the viewer is somewhere");
-        let right = unit(cross(z, out)).expect("the viewer is not above");
-        let up = cross(out, right);
-        let path = lines.iter().flat_map(|l| l.points.iter().flatten());
-        let points = || triangles.iter().flatten().chain(path.clone());
-        let finite = || points().filter(|p| p.iter().all(|c| c.is_finite()));
-        let extent = |axis: Point| Interval::of(finite().map(|&p| dot(p, axis)));
-        let extents = [extent(right), extent(up)];
-        let size = [SIZE.0, SIZE.1].map(|s| f64::from(s) * SAMPLES as f64);
-        let fits = |k: usize| {
-            let length = extents[k].high - extents[k].low;
-            size[k] * (1.0 - 2.0 * MARGIN) / length.max(1.0e-6)
-        };
-        let scale = fits(0).min(fits(1));
-        let shift = |k: usize| 0.5 * size[k] - 0.5 * scale * (extents[k].low + extents[k].high);
-        Self {
-            right,
-            up,
-            out,
-            scale,
-            shift: [shift(0), shift(1)],
-        }
-    }
-
-    /// Sample from the left and from the top, and depth towards the viewer in mm.
-    fn project(&self, p: Point) -> Point {
-        let height = f64::from(SIZE.1) * SAMPLES as f64;
-        let x = dot(p, self.right) * self.scale + self.shift[0];
-        let y = dot(p, self.up) * self.scale + self.shift[1];
-        [x, height - y, dot(p, self.out)]
-    }
-}
-
-/// The samples: how far towards the viewer the part lies there, and how bright it is.
-struct Canvas {
-    width: usize,
-    height: usize,
-    depth: Vec<f32>,
-    light: Vec<f32>,
-}
-
-impl Canvas {
-    fn new(view: &View, triangles: &[[Point; 3]]) -> Self {
-        let (width, height) = (SIZE.0 as usize * SAMPLES, SIZE.1 as usize * SAMPLES);
-        let mut canvas = Self {
-            width,
-            height,
-            depth: vec![f32::NEG_INFINITY; width * height],
-            light: vec![0.0; width * height],
-        };
-        for &[a, b, c] in triangles {
-            // A triangle without an area covers no sample, and one that is not finite none either.
-            if let Some(normal) = unit(cross(sub(b, a), sub(c, a))) {
-                let corners = [a, b, c].map(|p| view.project(p));
-                canvas.fill(corners, shade(view, normal) as f32);
-            }
-        }
-        canvas
-    }
-
-    fn fill(&mut self, [a, b, c]: [Point; 3], light: f32) {
-        let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-        if area == 0.0 || !area.is_finite() {
-            return;
-        }
-        let range = |k: usize, count: usize| {
-            let i = Interval::of([a[k], b[k], c[k]]);
-            let first = (i.low - 0.5).ceil().max(0.0) as usize;
-            let end = (i.high + 0.5).ceil().clamp(0.0, count as f64) as usize;
-            first..end
-        };
-        let share = |p: Point, q: Point, x: f64, y: f64| {
-            ((q[0] - p[0]) * (y - p[1]) - (x - p[0]) * (q[1] - p[1])) / area
-        };
-        for row in range(1, self.height) {
-            for column in range(0, self.width) {
-                let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
-                let (u, v, w) = (share(b, c, x, y), share(c, a, x, y), share(a, b, x, y));
-                if u < 0.0 || v < 0.0 || w < 0.0 {
-                    continue;
-                }
-                let depth = (u * a[2] + v * b[2] + w * c[2]) as f32;
-                let sample = row * self.width + column;
-                if depth > self.depth[sample] {
-                    self.depth[sample] = depth;
-                    self.light[sample] = light;
-                }
-            }
-        }
-    }
-
-    /// The picture: each pixel the mean of its samples.
-    fn resolve(&self) -> Pixmap {
-        let mut picture = Pixmap::new(SIZE.0, SIZE.1).expect("the size is not zero");
-        let columns = SIZE.0 as usize;
-        for (i, pixel) in picture.pixels_mut().iter_mut().enumerate() {
-            let (row, column) = (i / columns, i % columns);
-            let t = row as f64 / f64::from(SIZE.1);
-            let behind: [f64; 3] =
-                std::array::from_fn(|k| BACKGROUND[0][k] * (1.0 - t) + BACKGROUND[1][k] * t);
-            let mut sum = [0.0; 3];
-            for k in 0..SAMPLES * SAMPLES {
-                let (y, x) = (row * SAMPLES + k / SAMPLES, column * SAMPLES + k % SAMPLES);
-                let sample = y * self.width + x;
-                let light = f64::from(self.light[sample]);
-                let colour = match self.depth[sample] {
-                    f32::NEG_INFINITY => behind,
-                    _ => BEECH.map(|c| c * light),
-                };
-                sum = std::array::from_fn(|k| sum[k] + colour[k].min(255.0));
-            }
-            let [r, g, b] = sum.map(|s| (s / (SAMPLES * SAMPLES) as f64).round() as u8);
-            *pixel = tiny_skia::ColorU8::from_rgba(r, g, b, 255).premultiply();
-        }
-        picture
-    }
-
-    /// Whether the part is in front of a projected point.
-    fn hides(&self, p: Point) -> bool {
-        let inside = |c: f64, count: usize| c >= 0.0 && c < count as f64;
-        inside(p[0], self.width)
-            && inside(p[1], self.height)
-            && f64::from(self.depth[p[1] as usize * self.width + p[0] as usize]) > p[2] + SUNK
-    }
-}
-
-/// Brightness of a facet. Both its sides are lit, since a mesh may be turned inside out.
-fn shade(view: &View, normal: Point) -> f64 {
-    let seen = [view.right, view.up, view.out].map(|axis| dot(normal, axis));
-    let seen = if seen[2] < 0.0 {
-        seen.map(|c| -c)
-    } else {
-        seen
+/// The tool centre at each position as the part sees it: the cutter turns about the part.
+fn centres(path: &ToolPath) -> Vec<Option<Point>> {
+    let turns = path.trajectory.directions().into_iter().cycle();
+    let centre = |((index, touch), (cos, sin)): ((u64, &Option<Touch>), (f64, f64))| {
+        let height = touch.as_ref()?.height;
+        Some([path.trajectory.travel(index), height * cos, -height * sin])
     };
-    let light = unit(LIGHT).unwrap_or(LIGHT);
-    let diffuse = dot(seen, light).max(0.0);
-    let halfway = unit([light[0], light[1], light[2] + 1.0]).unwrap_or(light);
-    let gloss = dot(seen, halfway).max(0.0).powi(24);
-    0.42 + 0.08 * seen[1] + 0.57 * diffuse + 0.1 * gloss
-}
-
-/// Draws the pieces of a line that the part does not hide.
-fn stroke(picture: &mut Pixmap, view: &View, canvas: &Canvas, line: &Polyline) {
-    let pieces = line.points.windows(2).filter_map(|w| w[0].zip(w[1]));
-    let lengths: Vec<f64> = pieces
-        .map(|(a, b)| length(sub(b, a)))
-        .filter(|l| l.is_finite())
-        .collect();
-    let longest = JUMP * lengths.iter().sum::<f64>() / lengths.len() as f64;
-    let mut path = PathBuilder::new();
-    let mut previous: Option<Point> = None;
-    let mut drawing = false;
-    for &point in line.points {
-        let visible = previous.zip(point).and_then(|(a, b)| {
-            // A comparison that holds for what is finite only.
-            let near = length(sub(b, a)) <= longest;
-            let [a, b] = [a, b].map(|p| view.project(p));
-            let middle = std::array::from_fn(|k| 0.5 * (a[k] + b[k]));
-            (near && !canvas.hides(middle) && !canvas.hides(b)).then_some((a, b))
-        });
-        if let Some((a, b)) = visible {
-            let pixel = |c: f64| c as f32 / SAMPLES as f32;
-            if !drawing {
-                path.move_to(pixel(a[0]), pixel(a[1]));
-            }
-            path.line_to(pixel(b[0]), pixel(b[1]));
-        }
-        drawing = visible.is_some();
-        previous = point;
-    }
-    let mut paint = Paint::default();
-    let [r, g, b] = line.colour;
-    paint.set_color_rgba8(r, g, b, 255);
-    let style = Stroke {
-        width: line.width,
-        line_cap: LineCap::Round,
-        line_join: LineJoin::Round,
-        ..Stroke::default()
-    };
-    if let Some(path) = path.finish() {
-        picture.stroke_path(&path, &paint, &style, Transform::identity(), None);
-    }
+    (0..).zip(&path.touches).zip(turns).map(centre).collect()
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use horma_core::{Body, Mesh, Motion, MotionKind};
+
+    use super::*;
+
+    #[test]
+    fn a_part_and_its_path_are_drawn() {
+        let corners = vec![[0.0; 3], [10.0, 0.0, 0.0], [10.0, 0.0, 8.0]];
+        let mesh = Mesh::new("m", corners, vec![[0, 1, 2]]).expect("valid");
+        let part = Part {
+            bodies: vec![Body {
+                name: "m".to_owned(),
+                shape: Shape::Mesh(mesh),
+            }],
+        };
+        let motion = Motion {
+            kind: MotionKind::Helix,
+            step: 5.0,
+            points_per_revolution: 4,
+            from: Some(0.0),
+            to: Some(10.0),
+        };
+        let extent = Interval {
+            low: 0.0,
+            high: 10.0,
+        };
+        let trajectory = motion.over(extent, 1.0).expect("valid");
+        let touch = Touch {
+            height: 20.0,
+            contact: [0.0; 3],
+        };
+        let mut touches = vec![Some(touch); 9];
+        touches[2] = None;
+        let path = ToolPath {
+            trajectory,
+            touches,
+        };
+
+        let centres = centres(&path);
+        assert_eq!(centres[0], Some([0.0, 20.0, 0.0]));
+        assert_eq!(centres[2], None);
+        let [x, y, z] = centres[5].expect("touched");
+        assert!(x == 6.25 && y.abs() < 1e-12 && z == -20.0);
+
+        let dir = tempfile::tempdir().expect("a scratch directory");
+        let file = dir.path().join("preview.png");
+        save(&file, &part, &path).expect("written");
+        let bytes = std::fs::read(&file).expect("there");
+        assert!(bytes.starts_with(b"\x89PNG"));
+    }
+}

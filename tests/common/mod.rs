@@ -60,7 +60,9 @@ pub fn sample() -> PathBuf {
 
 /// A file of the test data that lies beside the project on some machines; says so if it is missing.
 pub fn data(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../shared/data")
+        .join(name);
     if path.exists() {
         return path.canonicalize().ok();
     }
@@ -104,7 +106,10 @@ impl Process {
     pub fn start(name: &str, args: &[&str], log: &str) -> Self {
         let mut command = horma();
         command.args(args).env("HORMA_LOG", log);
-        let spawned = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+        let spawned = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn();
         let mut child = spawned.expect("the binary starts");
         let (sender, lines) = channel();
         let outputs: [Box<dyn std::io::Read + Send>; 2] = [
@@ -137,7 +142,10 @@ impl Process {
         }
         let begin = Instant::now();
         loop {
-            match self.lines.recv_timeout(DEADLINE.saturating_sub(begin.elapsed())) {
+            match self
+                .lines
+                .recv_timeout(DEADLINE.saturating_sub(begin.elapsed()))
+            {
                 Ok(line) => {
                     self.seen.push(line.clone());
                     if has(&line) {
@@ -146,7 +154,11 @@ impl Process {
                 }
                 Err(RecvTimeoutError::Timeout) => panic!("{words:?} never came\n{}", self.log()),
                 Err(RecvTimeoutError::Disconnected) => {
-                    panic!("{} ended before it said {words:?}\n{}", self.name, self.log())
+                    panic!(
+                        "{} ended before it said {words:?}\n{}",
+                        self.name,
+                        self.log()
+                    )
                 }
             }
         }
@@ -157,7 +169,10 @@ impl Process {
         let begin = Instant::now();
         // Both outputs close when the process ends.
         loop {
-            match self.lines.recv_timeout(DEADLINE.saturating_sub(begin.elapsed())) {
+            match self
+                .lines
+                .recv_timeout(DEADLINE.saturating_sub(begin.elapsed()))
+            {
                 Ok(line) => self.seen.push(line),
                 Err(RecvTimeoutError::Disconnected) => break,
                 Err(RecvTimeoutError::Timeout) => panic!("it does not end\n{}", self.log()),

@@ -1,0 +1,386 @@
+//! The command as its user meets it: what it answers to bad input, and with which exit code.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use common::{job, master, report, run, sample, scratch, succeed, text, texts};
+
+const GOOD: &str =
+    "[cutter]\nkind = \"ball\"\nradius = 8.0\n[motion]\nstep = 20.0\npoints_per_revolution = 12\n";
+
+/// The command fails with this exit code, one message that has all of these words, and nothing on
+/// standard output.
+fn check(args: &[&str], code: i32, words: &[&str]) {
+    let output = run(args);
+    let (out, err) = texts(&output);
+    assert_eq!(
+        output.status.code(),
+        Some(code),
+        "horma {args:?}\n{out}{err}"
+    );
+    assert_eq!(out, "", "horma {args:?}");
+    assert_eq!(err.matches("horma: ").count(), 1, "one message: {err}");
+    assert!(!err.contains("panicked"), "{err}");
+    for word in words {
+        assert!(err.contains(word), "{word:?} is not in: {err}");
+    }
+}
+
+/// A run of a job fails, and leaves no result behind.
+fn check_job(dir: &Path, job: &Path, code: i32, words: &[&str]) {
+    let out = dir.join("out");
+    check(&["run", text(job), "-o", text(&out), "-q"], code, words);
+    let left = std::fs::read_dir(&out).map_or(0, Iterator::count);
+    assert_eq!(left, 0, "something is left in the output directory");
+}
+
+fn file(dir: &Path, name: &str, content: &[u8]) -> PathBuf {
+    let path = dir.join(name);
+    std::fs::write(&path, content).expect("writable");
+    path
+}
+
+#[test]
+fn bad_parts_are_refused() {
+    let dir = scratch();
+    let dir = dir.path();
+    let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 nan\nvertex 0 1 0\nendloop\nendfacet\n";
+    let mut lying = vec![0; 84];
+    lying[80..84].copy_from_slice(&1000u32.to_le_bytes());
+    lying.extend([0; 50]);
+    let mut infinite = vec![0; 134];
+    infinite[80] = 1;
+    infinite[96..100].copy_from_slice(&f32::INFINITY.to_le_bytes());
+    let plain_step = "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN { 1 0 10303 214 1 1 1 1 }'));\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));\nENDSEC;\nEND-ISO-10303-21;\n";
+    let not_a_number = format!("solid\n{facet}endsolid\n");
+    let cases: [(&str, &[u8], &[&str]); 9] = [
+        ("truncated.stl", &[0; 40], &["truncated.stl", "84"]),
+        ("lying.stl", &lying, &["lying.stl", "1000 triangles"]),
+        ("nan.stl", not_a_number.as_bytes(), &["nan.stl", "NaN"]),
+        ("infinite.stl", &infinite, &["infinite.stl", "inf"]),
+        ("empty.stl", &[0; 84], &["empty.stl"]),
+        ("empty.obj", b"", &["empty.obj", "empty"]),
+        ("far.obj", b"v 0 0 0\nv 1 0 0\nf 1 2 9\n", &["far.obj", "3"]),
+        (
+            "plain.step",
+            plain_step.as_bytes(),
+            &["plain.step", "no surface"],
+        ),
+        ("part.iges", b"x", &["part.iges", "STEP"]),
+    ];
+    for (name, content, words) in cases {
+        let part = file(dir, name, content);
+        check_job(dir, &job(dir, "job.toml", &[&part], GOOD), 2, words);
+        check(&["inspect", text(&part)], 2, words);
+    }
+    let missing = dir.join("missing.stl");
+    check_job(
+        dir,
+        &job(dir, "job.toml", &[&missing], GOOD),
+        2,
+        &["missing.stl"],
+    );
+    check_job(dir, &job(dir, "job.toml", &[dir], GOOD), 2, &["folder"]);
+    check_job(dir, &job(dir, "job.toml", &[], GOOD), 2, &[]);
+}
+
+#[test]
+fn bad_jobs_are_refused_with_their_place() {
+    let dir = scratch();
+    let dir = dir.path();
+    let part = sample().with_file_name("last.step");
+    let cases: [(&str, &str, &[&str]); 12] = [
+        (
+            "radius = 8.0",
+            "raduis = 8.0",
+            &["job.toml", "raduis", "radius"],
+        ),
+        ("radius = 8.0", "radius = \"8\"", &["job.toml", "radius"]),
+        (
+            "radius = 8.0",
+            "radius = -8.0",
+            &["radius", "-8", "greater than 0"],
+        ),
+        ("radius = 8.0", "radius = nan", &["radius"]),
+        ("\"ball\"", "\"spoon\"", &["spoon", "torus"]),
+        (
+            "kind = \"ball\"\nradius = 8.0",
+            "kind = \"cone\"\nradius = 5.0\nwidth = 20.0\nhalf_angle = 45.0",
+            &["half_angle", "45"],
+        ),
+        (
+            "points_per_revolution = 12",
+            "points_per_revolution = 0",
+            &["points_per_revolution", "at least 1"],
+        ),
+        ("step = 20.0", "step = 0", &["step", "greater than 0"]),
+        (
+            "step = 20.0",
+            "step = 20.0\nfrom = 5\nto = 1",
+            &["from 5 to 1"],
+        ),
+        (
+            "[motion]",
+            "[discretization]\ntolerance = 0\n[motion]",
+            &["tolerance", "0"],
+        ),
+        (
+            "[motion]",
+            "[digitizing]\nmethod = \"guess\"\n[motion]",
+            &["guess", "exact"],
+        ),
+        ("[motion]", "[[motion]", &["job.toml"]),
+    ];
+    for (good, bad, words) in cases {
+        let job = job(dir, "job.toml", &[&part], &GOOD.replace(good, bad));
+        let code = if bad.contains("from") { 3 } else { 2 };
+        check_job(dir, &job, code, words);
+    }
+    check_job(dir, &dir.join("nowhere.toml"), 2, &["nowhere.toml"]);
+    let good = job(dir, "job.toml", &[&part], GOOD);
+    let out = dir.join("out");
+    let flag = ["run", text(&good), "-o", text(&out), "--step", "0"];
+    check(&flag, 2, &["--step", "greater than 0"]);
+}
+
+#[test]
+fn jobs_that_cannot_be_done_are_refused_before_they_are_tried() {
+    let dir = scratch();
+    let dir = dir.path();
+    let part = sample().with_file_name("last.step");
+    let cases: [(&str, &str, &[&str]); 4] = [
+        (
+            "step = 20.0",
+            "step = 1e-9",
+            &["positions", "GB", "larger step"],
+        ),
+        ("step = 20.0", "step = 1e-300", &["positions"]),
+        (
+            "[motion]",
+            "[discretization]\ngrid = { rows = 1000000, columns = 1000000 }\n[motion]",
+            &["points", "GB"],
+        ),
+        (
+            "[motion]",
+            "[discretization]\ngrid = { rows = 4000000000, columns = 2 }\n[motion]",
+            &["4000000000"],
+        ),
+    ];
+    for (good, bad, words) in cases {
+        check_job(
+            dir,
+            &job(dir, "job.toml", &[&part], &GOOD.replace(good, bad)),
+            3,
+            words,
+        );
+    }
+    // Beside the part there is nothing to touch, and so nothing to cut.
+    let beside = GOOD.replace("step = 20.0", "step = 20.0\nfrom = 5000\nto = 5100");
+    check_job(
+        dir,
+        &job(dir, "job.toml", &[&part], &beside),
+        3,
+        &["never touches"],
+    );
+}
+
+#[test]
+fn output_directories_that_are_not_ours_are_left_alone() {
+    let dir = scratch();
+    let dir = dir.path();
+    let job = job(
+        dir,
+        "job.toml",
+        &[&sample().with_file_name("last.step")],
+        GOOD,
+    );
+    let theirs = dir.join("theirs");
+    std::fs::create_dir(&theirs).expect("writable");
+    file(&theirs, "thesis.txt", b"years of work");
+    for (out, words) in [
+        (theirs.clone(), ["theirs", "thesis.txt"]),
+        (file(dir, "a file", b""), ["a file", "not a directory"]),
+        (dir.join("a file/below"), ["a file", "below"]),
+        (PathBuf::from("/proc/horma"), ["/proc/horma", ""]),
+    ] {
+        check(&["run", text(&job), "-o", text(&out), "-q"], 2, &words);
+    }
+    assert_eq!(std::fs::read_dir(&theirs).expect("there").count(), 1);
+}
+
+#[test]
+fn addresses_that_cannot_be_used_are_named() {
+    let (_master, address) = master(&[]);
+    check(
+        &["master", "--bind", &address],
+        2,
+        &["cannot listen", &address],
+    );
+    check(&["master", "--bind", "0.0.0.0:0"], 2, &["--insecure"]);
+    let port = address.rsplit(':').next().expect("a port");
+    check(
+        &["worker", "--master", &address, "--bind", &address],
+        2,
+        &["cannot listen", port],
+    );
+
+    // A port that was free a moment ago has no master.
+    let free = std::net::TcpListener::bind("127.0.0.1:0").and_then(|l| l.local_addr());
+    let nobody = free.expect("a port").to_string();
+    let dir = scratch();
+    let out = dir.path().join("out");
+    let sample = sample();
+    let submit = [
+        "submit",
+        text(&sample),
+        "-o",
+        text(&out),
+        "-q",
+        "--master",
+        &nobody,
+    ];
+    check(&submit, 4, &["no master answers", &nobody]);
+    let worker = [
+        "worker",
+        "--master",
+        &nobody,
+        "--bind",
+        "127.0.0.1:0",
+        "--patience",
+        "0",
+    ];
+    let output = run(&worker);
+    assert_eq!(output.status.code(), Some(4));
+    assert!(
+        texts(&output).1.contains("no master answered"),
+        "{output:?}"
+    );
+    check(
+        &[
+            "submit",
+            text(&sample),
+            "-o",
+            text(&out),
+            "-q",
+            "--master",
+            "no port",
+        ],
+        2,
+        &["host:port"],
+    );
+}
+
+#[test]
+fn the_sample_is_written_runs_and_is_not_overwritten() {
+    let dir = scratch();
+    let demo = dir.path().join("demo");
+    let said = succeed(&["init", text(&demo)]);
+    let job = demo.join("job.toml");
+    assert!(said.contains(&format!("horma run {}", job.display())));
+    for name in ["job.toml", "last.step"] {
+        let ours = std::fs::read(demo.join(name)).expect("written");
+        assert!(ours == std::fs::read(sample().with_file_name(name)).expect("committed"));
+    }
+    check(&["init", text(&demo)], 2, &["job.toml"]);
+
+    let out = dir.path().join("out");
+    let output = run(&["run", text(&job), "-o", text(&out), "--step", "10"]);
+    let (said, progress) = texts(&output);
+    assert!(output.status.success(), "{progress}");
+    for name in ["path.csv", "path.ngc", "report.json", "preview.png"] {
+        assert!(
+            said.contains(name) && out.join(name).exists(),
+            "{name}: {said}"
+        );
+    }
+    for phase in ["read", "discretize", "digitize", "stitch", "write"] {
+        assert!(progress.contains(phase), "{phase}: {progress}");
+    }
+    let report = report(&out);
+    assert_eq!(report["bodies"].as_array().map(Vec::len), Some(3));
+    assert_eq!(report["job"]["motion"]["step"], 10.0);
+    let positions = report["path"]["positions"].as_u64().expect("positions");
+    let csv = std::fs::read_to_string(out.join("path.csv")).expect("a path");
+    assert_eq!(csv.lines().count() as u64, positions + 1);
+    // The same directory takes the next run; quiet means quiet.
+    let quiet = run(&[
+        "run",
+        text(&job),
+        "-o",
+        text(&out),
+        "--step",
+        "10",
+        "--quiet",
+    ]);
+    assert_eq!(texts(&quiet), (String::new(), String::new()));
+}
+
+#[test]
+fn variables_lie_between_flags_and_file() {
+    let dir = scratch();
+    let job = job(
+        dir.path(),
+        "job.toml",
+        &[&sample().with_file_name("last.step")],
+        GOOD,
+    );
+    let out = dir.path().join("out");
+    let step_with = |flags: &[&str]| {
+        let mut command = common::horma();
+        command
+            .args(["run", text(&job), "-o", text(&out), "-q"])
+            .args(flags);
+        let output = command.env("HORMA_STEP", "30").output().expect("starts");
+        assert!(output.status.success(), "{output:?}");
+        report(&out)["job"]["motion"]["step"].as_f64()
+    };
+    assert_eq!(step_with(&[]), Some(30.0));
+    assert_eq!(step_with(&["--step", "40"]), Some(40.0));
+}
+
+#[test]
+fn an_open_mesh_is_cut_with_a_warning() {
+    let dir = scratch();
+    let obj = "v 0 5 0\nv 10 5 0\nv 10 0 5\nv 0 0 5\nf 1 2 3\nf 1 3 4\n";
+    let part = file(dir.path(), "open.obj", obj.as_bytes());
+    let job = job(dir.path(), "job.toml", &[&part], GOOD);
+    let out = dir.path().join("out");
+    let output = run(&["run", text(&job), "-o", text(&out)]);
+    let (_, err) = texts(&output);
+    assert!(output.status.success(), "{err}");
+    assert!(
+        err.contains("warning") && err.contains("4 edges are open"),
+        "{err}"
+    );
+    let path = &report(&out)["path"];
+    assert!(
+        path["without_contact"].as_u64() > Some(0),
+        "a sheet is out of reach from behind"
+    );
+    let csv = std::fs::read_to_string(out.join("path.csv")).expect("a path");
+    assert!(
+        csv.lines().any(|line| line.ends_with(",,,,")),
+        "an empty contact"
+    );
+}
+
+#[test]
+fn inspect_tells_what_is_in_a_file() {
+    let part = sample().with_file_name("last.step");
+    let said = succeed(&["inspect", text(&part)]);
+    for word in ["last", "toe holder", "heel holder", "cubic", "mm"] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+}
+
+#[test]
+fn help_teaches_and_completions_complete() {
+    let help = succeed(&["--help"]);
+    for word in ["horma init", "horma submit", "Exit codes", "run", "worker"] {
+        assert!(help.contains(word), "{word}");
+    }
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(succeed(&["completions", shell]).contains("horma"));
+    }
+}
