@@ -75,13 +75,14 @@ fn perform(
     display.tell("write", 0, 0);
     let begin = Instant::now();
     let dir = args.output.as_path();
-    csv::save(&dir.join(output::PATH), &path)?;
     let echo = file.echo();
     let heading = [
         ("job", &*args.file.to_string_lossy()),
         ("cutter", &described(&echo["cutter"])),
     ];
+    // The program comes first: it alone can find the path of no use.
     gcode::save(&dir.join(output::PROGRAM), &path, file.program, &heading)?;
+    csv::save(&dir.join(output::PATH), &path)?;
     preview::save(&dir.join(output::PREVIEW), &part, &path)?;
     record.phases.push(phase("write", begin));
     let report = Report {

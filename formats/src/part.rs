@@ -145,7 +145,6 @@ pub fn read_all(paths: &[PathBuf]) -> Result<(Part, Vec<Warning>)> {
 /// [`Error::Io`], [`Error::Folder`], [`Error::FileTooLarge`], [`Error::EmptyFile`],
 /// [`Error::UnknownFormat`], [`Error::NotYet`], [`Error::OtherContent`], and those of the format's own reader.
 pub fn read(path: &Path) -> Result<Loaded> {
-    let format = format_of(path)?;
     let io = |source| Error::Io {
         path: path.to_owned(),
         source,
@@ -163,6 +162,7 @@ pub fn read(path: &Path) -> Result<Loaded> {
             limit: MAX_LENGTH,
         });
     }
+    let format = format_of(path)?;
     let bytes = fs::read(path).map_err(io)?;
     let name = path.file_name().unwrap_or(path.as_os_str());
     parse(&name.to_string_lossy(), format, &bytes)
