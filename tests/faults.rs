@@ -169,7 +169,9 @@ fn an_interrupt_stops_a_run_and_its_workers() {
 }
 
 /// A worker that sends positions which cannot be right, in one of several ways.
-struct Liar(fn(wire::Task) -> DigitizeReply);
+struct Liar(Lie);
+
+type Lie = fn(wire::Task) -> DigitizeReply;
 
 #[tonic::async_trait]
 impl Worker for Liar {
@@ -192,7 +194,7 @@ impl Worker for Liar {
 }
 
 /// Serves a liar and registers it.
-async fn lie(master: &str, id: &str, how: fn(wire::Task) -> DigitizeReply) {
+async fn lie(master: &str, id: &str, how: Lie) {
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
     let address = listener.local_addr().expect("bound").to_string();
     let server = tonic::transport::Server::builder()
@@ -233,7 +235,7 @@ fn positions(task: wire::Task, skip: u64, count: u64) -> DigitizeReply {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn workers_that_answer_wrongly_are_found_out() {
-    let lies: [(&str, fn(wire::Task) -> DigitizeReply); 5] = [
+    let lies: [(&str, Lie); 5] = [
         ("checksum", |task| {
             let mut reply = positions(task, 0, 10);
             if let Some(Kind::Positions(p)) = &mut reply.kind {

@@ -26,7 +26,8 @@ fn ask(script: &str, args: &[&str]) -> bool {
         "{} {args:?}\n{out}{err}",
         script.display()
     );
-    print!("{out}");
+    // Shown with --nocapture.
+    eprint!("{out}");
     true
 }
 

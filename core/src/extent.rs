@@ -79,7 +79,7 @@ pub fn split(
 fn predicted(method: Method, candidates: u64) -> f64 {
     let n = candidates as f64;
     match method {
-        Method::Exact => 0.05 + (1.0 + n).log2(),
+        Method::Exact => 0.05 + libm::log2(1.0 + n),
         Method::Brute => 0.05 + n,
     }
 }
