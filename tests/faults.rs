@@ -5,7 +5,7 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{Process, job, master, path_of, report, sample, scratch, text, worker};
+use common::{Process, data, job, master, path_of, report, sample, scratch, text, worker};
 use horma_proto::wire::digitize_reply::Kind;
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::worker_server::{Worker, WorkerServer};
@@ -16,12 +16,18 @@ use tonic::{Request, Response, Status, Streaming};
 
 /// A job that takes brute force long enough to be interrupted in the middle of each extent.
 fn long_job(dir: &Path) -> PathBuf {
-    let more = "[discretization]\ngrid = { rows = 159, columns = 120 }
+    long_job_of(dir, &sample().with_file_name("last.step"), "point")
+}
+
+fn long_job_of(dir: &Path, part: &Path, contact: &str) -> PathBuf {
+    let more = format!(
+        "axis = \"auto\"
+[discretization]\ngrid = {{ rows = 159, columns = 120 }}
 [cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
 [motion]\nstep = 2.0\npoints_per_revolution = 90
-[digitizing]\ncontact = \"point\"\nmethod = \"brute\"\n";
-    let part = sample().with_file_name("last.step");
-    job(dir, "long.toml", &[&part], more)
+[digitizing]\ncontact = \"{contact}\"\nmethod = \"brute\"\n"
+    );
+    job(dir, "long.toml", &[part], &more)
 }
 
 fn submit(job: &Path, master: &str, out: &Path) -> Process {
@@ -31,8 +37,19 @@ fn submit(job: &Path, master: &str, out: &Path) -> Process {
 
 #[test]
 fn a_worker_killed_while_it_computes_costs_no_byte() {
+    let sample = sample().with_file_name("last.step");
+    check_killed(&sample, "point");
+    // Brute force over a few thousand points is too quick; over their facets it is not.
+    for (part, contact) in [("last_3surfaces.step", "point"), ("last_scan.stl", "facet")] {
+        if let Some(part) = data(part) {
+            check_killed(&part, contact);
+        }
+    }
+}
+
+fn check_killed(part: &Path, contact: &str) {
     let dir = scratch();
-    let job = long_job(dir.path());
+    let job = long_job_of(dir.path(), part, contact);
     let exact = path_of(&job, dir.path(), "alone", &["--method", "exact"]);
     let (mut master, address) = master(&[]);
     let mut victim = worker(&address, "victim");

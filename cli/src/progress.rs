@@ -4,7 +4,7 @@ use std::io::{IsTerminal, Write, stderr};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 /// How often plain lines tell of a phase that takes long.
 const LINE_EVERY: Duration = Duration::from_secs(5);
@@ -141,7 +141,7 @@ fn line(text: &str) {
 }
 
 fn counted() -> ProgressStyle {
-    style("{msg:<10} {wide_bar} {human_pos}/{human_len}  {per_sec}  {eta} left")
+    style("{msg:<10} {wide_bar} {human_pos}/{human_len}  {rate}  {eta} left")
 }
 
 fn uncounted() -> ProgressStyle {
@@ -149,5 +149,13 @@ fn uncounted() -> ProgressStyle {
 }
 
 fn style(template: &str) -> ProgressStyle {
-    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+    let style = ProgressStyle::with_template(template);
+    let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
+    style.with_key(
+        "rate",
+        |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+            // A bar that cannot be drawn is not worth an error.
+            let _ = write!(out, "{:.0}/s", state.per_sec());
+        },
+    )
 }

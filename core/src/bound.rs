@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use crate::contact::Pose;
 use crate::cutter::Cutter;
-use crate::tolerance::BOUND_SLACK;
+use crate::tolerance::{BOUND_SLACK, REACH_SLACK};
 use crate::vector::{Interval, Point, add_scaled, dot, length, sub};
 
 /// A box, turned any way, that holds a part of the part.
@@ -98,7 +98,8 @@ impl Patch {
     #[inline]
     pub fn bound(&self, cutter: &Cutter, pose: &Pose) -> Option<f64> {
         let w = cutter.half_width();
-        if self.x.high < pose.x - w || self.x.low > pose.x + w {
+        let reach = w + REACH_SLACK;
+        if self.x.high < pose.x - reach || self.x.low > pose.x + reach {
             return None;
         }
         let [d, y, z] = pose.face(self.center);
@@ -109,19 +110,32 @@ impl Patch {
         }
         let circle = y + ((around - z) * (around + z)).max(0.0).sqrt();
 
-        let Tangent {
-            d: at_d,
-            z: at_z,
-            rise,
-            by_d,
-            by_z,
-        } = Tangent::near(cutter, d, z);
+        let tangent = Tangent::near(cutter, d, z);
         // The tangent plane's gradient, turned back into the part's frame.
+        let Tangent { by_d, by_z, .. } = tangent;
         let gradient = [by_d, pose.cos + pose.sin * by_z, pose.cos * by_z - pose.sin];
         let over_box: f64 = self.axes.iter().map(|&a| dot(gradient, a).abs()).sum();
-        let plane = y + rise + by_d * (d - at_d) + by_z * (z - at_z) + over_box;
+        let plane = tangent.over([d, y, z]) + over_box;
         Some(plane.min(circle) + slack)
     }
+}
+
+/// An upper bound of F over a facet, or `None` if nothing of it can be in reach: its tangent plane at
+/// the facet's middle is highest at a corner.
+#[inline(always)]
+pub(crate) fn facet_bound(cutter: &Cutter, pose: &Pose, corners: [Point; 3]) -> Option<f64> {
+    let w = cutter.half_width();
+    let seen = corners.map(|p| pose.face(p));
+    let [a, b, c] = seen;
+    if a[0].min(b[0]).min(c[0]) > w || a[0].max(b[0]).max(c[0]) < -w {
+        return None;
+    }
+    let middle = |axis: usize| (a[axis] + b[axis] + c[axis]) / 3.0;
+    let tangent = Tangent::near(cutter, middle(0), middle(2));
+    let size = cutter.max_radius() + pose.x.abs() + w;
+    let slack = BOUND_SLACK * (size + length(a) + length(b) + length(c));
+    let over = seen.map(|p| tangent.over(p));
+    Some(over[0].max(over[1]).max(over[2]) + slack)
 }
 
 /// The tangent plane of G(d, z) = √(m(d)² − z²).
@@ -162,12 +176,18 @@ impl Tangent {
             by_z: -z / rise,
         }
     }
+
+    /// F's upper bound at a point seen from the cutter.
+    #[inline(always)]
+    fn over(&self, [d, y, z]: Point) -> f64 {
+        y + self.rise + self.by_d * (d - self.d) + self.by_z * (z - self.z)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::touch_point;
+    use crate::contact::{touch_facet, touch_point};
     use proptest::prelude::*;
 
     proptest! {
@@ -201,6 +221,13 @@ mod tests {
                     if let Some(touch) = touch_point(&cutter, &pose, p) {
                         prop_assert!(bound.is_some_and(|b| b >= touch.height));
                     }
+                }
+            }
+            for corners in points.windows(3) {
+                let corners = [corners[0], corners[1], corners[2]];
+                if let Some(touch) = touch_facet(&cutter, &pose, corners) {
+                    let bound = facet_bound(&cutter, &pose, corners);
+                    prop_assert!(bound.is_some_and(|b| b >= touch.height));
                 }
             }
         }

@@ -7,6 +7,7 @@ use crate::cutter::Cutter;
 use crate::job::Method;
 use crate::motion::Trajectory;
 use crate::row::Outline;
+use crate::tolerance::REACH_SLACK;
 use crate::vector::Interval;
 
 /// A run of positions and the rows in reach from them.
@@ -33,7 +34,7 @@ pub fn split(
     method: Method,
     parts: u32,
 ) -> Vec<Extent> {
-    let w = cutter.half_width();
+    let w = cutter.half_width() + REACH_SLACK;
     let reach = Reach::new(outlines);
     let blocks = trajectory.positions.min(SAMPLES);
     let block =

@@ -8,6 +8,10 @@ pub const MAX_COORDINATE: f64 = 1.0e6;
 /// to the magnitude of the numbers that went into it: rounding must never prune the winner.
 pub const BOUND_SLACK: f64 = 1.0e-12;
 
+/// Added to the cutter's half width where rows and boxes are chosen by x, mm: what rounding puts just
+/// within reach of a contact must not be left out. Far above the rounding of any coordinate.
+pub const REACH_SLACK: f64 = 1.0e-9;
+
 /// A line search along a facet's edge stops once its bracket is this fraction of the edge. Near the
 /// maximum the height is flat, so the height's own error is of the order of this number's square.
 pub const EDGE_SEARCH: f64 = 1.0e-9;

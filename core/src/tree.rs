@@ -5,7 +5,7 @@
 //! The search is exact: a box is skipped only if its bound lies below the best height found, and of
 //! equal heights the lowest candidate wins, in whatever order they are met.
 
-use crate::bound::Patch;
+use crate::bound::{Patch, facet_bound};
 use crate::contact::{Pose, touch_facet, touch_point};
 use crate::cutter::Cutter;
 use crate::path::Touch;
@@ -26,8 +26,8 @@ pub(crate) trait Candidate: Copy + Send + Sync {
     fn id(&self) -> u64;
     /// Its corners, as indices into the points.
     fn corners(&self) -> &[u32];
-    /// Where the cutter touches it.
-    fn touch(&self, points: &[Point], cutter: &Cutter, pose: &Pose) -> Option<Touch>;
+    /// Where the cutter touches it; also `None` if that is plainly below `floor`.
+    fn touch(&self, points: &[Point], cutter: &Cutter, pose: &Pose, floor: f64) -> Option<Touch>;
 }
 
 /// A point of a row.
@@ -45,7 +45,7 @@ impl Candidate for PointCandidate {
         &self.point
     }
     #[inline(always)]
-    fn touch(&self, points: &[Point], cutter: &Cutter, pose: &Pose) -> Option<Touch> {
+    fn touch(&self, points: &[Point], cutter: &Cutter, pose: &Pose, _: f64) -> Option<Touch> {
         touch_point(cutter, pose, points[self.point[0] as usize])
     }
 }
@@ -65,8 +65,14 @@ impl Candidate for FacetCandidate {
         &self.corners
     }
     #[inline(always)]
-    fn touch(&self, points: &[Point], cutter: &Cutter, pose: &Pose) -> Option<Touch> {
-        touch_facet(cutter, pose, self.corners.map(|c| points[c as usize]))
+    fn touch(&self, points: &[Point], cutter: &Cutter, pose: &Pose, floor: f64) -> Option<Touch> {
+        let corners = self.corners.map(|c| points[c as usize]);
+        // Solving a facet costs several times what bounding it does.
+        if floor > f64::NEG_INFINITY && facet_bound(cutter, pose, corners).is_none_or(|b| b < floor)
+        {
+            return None;
+        }
+        touch_facet(cutter, pose, corners)
     }
 }
 
@@ -132,8 +138,21 @@ impl<C: Candidate> Tree<C> {
     /// Raises `best` to candidate number `place` of the tree if that is higher.
     #[inline]
     pub fn try_place(&self, place: u32, cutter: &Cutter, pose: &Pose, best: &mut Option<Winner>) {
+        let floor = best.as_ref().map_or(f64::NEG_INFINITY, |b| b.touch.height);
+        self.raise(place, cutter, pose, floor, best);
+    }
+
+    #[inline(always)]
+    fn raise(
+        &self,
+        place: u32,
+        cutter: &Cutter,
+        pose: &Pose,
+        floor: f64,
+        best: &mut Option<Winner>,
+    ) {
         let candidate = &self.candidates[place as usize];
-        if let Some(touch) = candidate.touch(&self.points, cutter, pose) {
+        if let Some(touch) = candidate.touch(&self.points, cutter, pose, floor) {
             let id = candidate.id();
             let wins = |b: &Winner| {
                 touch.height > b.touch.height || (touch.height == b.touch.height && id < b.id)
@@ -148,7 +167,8 @@ impl<C: Candidate> Tree<C> {
     pub fn try_all(&self, cutter: &Cutter, pose: &Pose, best: &mut Option<Winner>) -> Counters {
         let all = self.candidates.len() as u32;
         for place in 0..all {
-            self.try_place(place, cutter, pose, best);
+            // No floor: brute force solves every candidate, and so checks what the bounds skip.
+            self.raise(place, cutter, pose, f64::NEG_INFINITY, best);
         }
         Counters {
             evaluations: u64::from(all),

@@ -88,7 +88,7 @@ fn number(text: &mut String, value: f64) {
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be read, [`Error::BadCsvLine`] for the first line that is not what
-/// [`write`] writes.
+/// [`write()`] writes.
 pub fn read(file: &Path) -> Result<Vec<Row>> {
     let text = std::fs::read_to_string(file).map_err(|source| Error::io(file, source))?;
     let bad = |line: usize, expected, found: &str| Error::BadCsvLine {
