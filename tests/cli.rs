@@ -112,9 +112,9 @@ fn bad_jobs_are_refused_with_their_place() {
         (
             "points_per_revolution = 12",
             "points_per_revolution = 0",
-            &["points_per_revolution", "at least 1"],
+            &["points_per_revolution", "from 1 to 1000000"],
         ),
-        ("step = 20.0", "step = 0", &["step", "greater than 0"]),
+        ("step = 20.0", "step = 0", &["step", "at least 0.000001"]),
         (
             "step = 20.0",
             "step = 20.0\nfrom = 5\nto = 1",
@@ -140,7 +140,7 @@ fn bad_jobs_are_refused_with_their_place() {
     let good = job(dir, "job.toml", &[&part], GOOD);
     let out = dir.join("out");
     let flag = ["run", text(&good), "-o", text(&out), "--step", "0"];
-    check(&flag, 2, &["--step", "greater than 0"]);
+    check(&flag, 2, &["--step", "at least 0.000001"]);
 }
 
 #[test]
@@ -151,10 +151,14 @@ fn jobs_that_cannot_be_done_are_refused_before_they_are_tried() {
     let cases: [(&str, &str, &[&str]); 4] = [
         (
             "step = 20.0",
-            "step = 1e-9",
+            "step = 1e-6",
             &["positions", "GB", "larger step"],
         ),
-        ("step = 20.0", "step = 1e-300", &["positions"]),
+        (
+            "points_per_revolution = 12",
+            "points_per_revolution = 1000000\nto = 900000.0",
+            &["positions", "GB"],
+        ),
         (
             "[motion]",
             "[discretization]\ngrid = { rows = 1000000, columns = 1000000 }\n[motion]",

@@ -75,14 +75,9 @@ fn point_contact_equals_brute_force_on_another_librarys_grid() {
 fn point_contact_on_the_sample_equals_brute_force_on_another_librarys_grid() {
     let part = sample().with_file_name("last.step");
     let more = "[discretization]\ngrid = { rows = 80, columns = 60 }
-[cutter]\nkind = \"cone\"\nradius = 30.0\nwidth = 12.0\nhalf_angle = 20.0
+[cutter]\nkind = \"ball\"\nradius = 9.0
 [motion]\nkind = \"rings\"\nstep = 5.0\npoints_per_revolution = 90\n[digitizing]\ncontact = \"point\"\n";
-    // The oracle knows the torus alone: a ball wheel then.
-    let more = more.replace(
-        "kind = \"cone\"\nradius = 30.0\nwidth = 12.0\nhalf_angle = 20.0",
-        "kind = \"ball\"\nradius = 9.0",
-    );
-    check("point_contact.py", &[&part], &more, |csv| {
+    check("point_contact.py", &[&part], more, |csv| {
         words(&format!(
             "{} {csv} --rows 80 --columns 60 --minor 9",
             text(&part)
@@ -185,7 +180,12 @@ fn step_file(dir: &Path, surface: &Surface) -> PathBuf {
 
 const H: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-const CUTTERS: [(&str, &str); 3] = [
+const CUTTERS: [(&str, &str); 5] = [
+    ("kind = \"ball\"\nradius = 7.0", "--major 0 --minor 7"),
+    (
+        "kind = \"cone\"\nradius = 10.0\nwidth = 20.0\nhalf_angle = 45.0",
+        "--cutter cone --radius 10 --width 20 --half-angle 45",
+    ),
     (
         "kind = \"torus\"\nmajor_radius = 20.0\nminor_radius = 4.0",
         "--major 20 --minor 4",

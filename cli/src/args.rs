@@ -165,6 +165,14 @@ pub(crate) struct Job {
         help_heading = "Instead of the job file's"
     )]
     pub feed: Option<f64>,
+    /// Retract above the highest position, mm
+    #[arg(
+        long,
+        value_name = "MM",
+        env = "HORMA_CLEARANCE",
+        help_heading = "Instead of the job file's"
+    )]
+    pub clearance: Option<f64>,
     /// How the part reaches the workers: overlap
     #[arg(
         long,
@@ -188,7 +196,7 @@ impl Job {
             from: self.from,
             to: self.to,
             feed: self.feed,
-            clearance: None,
+            clearance: self.clearance,
         }
     }
 }

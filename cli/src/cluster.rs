@@ -8,6 +8,8 @@ use horma_core::{Job, Part};
 use horma_master::{Config, Outcome, Progress};
 use tokio::net::TcpListener;
 use tokio::process::{Child, Command};
+use tokio::sync::watch;
+use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
 use crate::error::{Error, Result};
@@ -47,25 +49,42 @@ pub(crate) async fn run(
     let shutdown = CancellationToken::new();
     let _stopped = shutdown.clone().drop_guard();
     let (master, _serving) = horma_master::start(listener, config, shutdown);
-    let mut children = (1..=workers)
-        .map(|i| spawn(&format!("local-{i}"), &address.to_string(), threads))
-        .collect::<Result<Vec<_>>>()?;
-
-    let mut registered = master.workers();
-    tokio::select! {
-        // Whether they all came is for the run to say.
-        _ = tokio::time::timeout(START, registered.wait_for(|&n| n >= workers as usize)) => {}
-        error = first_end(&mut children) => return Err(error),
+    // Each child belongs to a task that waits for its end; dropping the set kills them all.
+    let mut children = JoinSet::new();
+    for i in 1..=workers {
+        let mut child = spawn(&format!("local-{i}"), &address.to_string(), threads)?;
+        children.spawn(async move {
+            match child.wait().await {
+                Ok(status) => status.to_string(),
+                Err(error) => error.to_string(),
+            }
+        });
     }
-    let outcome = master.run(part, job, workers as usize, progress).await?;
-    for (_, child) in &mut children {
-        // It holds nothing: there is no kinder way to end it, and it may have ended already.
-        let _ = child.kill().await;
-    }
-    Ok(outcome)
+    everybody_there(&mut children, master.workers()).await?;
+    Ok(master.run(part, job, 1, progress).await?)
 }
 
-fn spawn(id: &str, master: &str, threads: usize) -> Result<(String, Child)> {
+/// Waits until every child that lives has registered.
+async fn everybody_there(
+    children: &mut JoinSet<String>,
+    mut registered: watch::Receiver<usize>,
+) -> Result<()> {
+    let deadline = tokio::time::Instant::now() + START;
+    loop {
+        let living = children.len();
+        tokio::select! {
+            _ = registered.wait_for(|&n| n >= living) => return Ok(()),
+            // Whether anybody came in time is for the run to say.
+            () = tokio::time::sleep_until(deadline) => return Ok(()),
+            Some(ended) = children.join_next() => if children.is_empty() {
+                let status = ended.unwrap_or_else(|e| e.to_string());
+                return Err(Error::WorkersEnded { status });
+            },
+        }
+    }
+}
+
+fn spawn(id: &str, master: &str, threads: usize) -> Result<Child> {
     let failed = |program: std::path::PathBuf, source| Error::Spawn { program, source };
     let program = std::env::current_exe().map_err(|e| failed("horma".into(), e))?;
     let mut command = Command::new(&program);
@@ -80,37 +99,7 @@ fn spawn(id: &str, master: &str, threads: usize) -> Result<(String, Child)> {
     // An interrupt typed at the terminal is for this process alone; it ends its workers.
     #[cfg(unix)]
     command.process_group(0);
-    let child = command.spawn().map_err(|e| failed(program, e))?;
-    Ok((id.to_owned(), child))
-}
-
-/// Waits for the first worker that ends.
-async fn first_end(children: &mut [(String, Child)]) -> Error {
-    let ends = children.iter_mut().map(|(id, child)| {
-        Box::pin(async move {
-            match child.wait().await {
-                Ok(status) => Error::WorkerEnded {
-                    id: id.clone(),
-                    status,
-                },
-                Err(source) => Error::Spawn {
-                    program: id.as_str().into(),
-                    source,
-                },
-            }
-        })
-    });
-    let mut ends: Vec<_> = ends.collect();
-    std::future::poll_fn(|context| {
-        let ended = ends
-            .iter_mut()
-            .find_map(|end| match end.as_mut().poll(context) {
-                std::task::Poll::Ready(error) => Some(error),
-                std::task::Poll::Pending => None,
-            });
-        ended.map_or(std::task::Poll::Pending, std::task::Poll::Ready)
-    })
-    .await
+    command.spawn().map_err(|e| failed(program, e))
 }
 
 /// Listens on an address.

@@ -27,17 +27,16 @@ pub(crate) enum Error {
         program: PathBuf,
         source: std::io::Error,
     },
-    #[error("local worker {id} ended with {status} before it registered")]
-    WorkerEnded {
-        id: String,
-        status: std::process::ExitStatus,
-    },
+    #[error("every local worker ended before it registered, the last one with {status}")]
+    WorkersEnded { status: String },
     #[error("no master answers at {address} ({reason}); is it running, and reachable from here")]
     NoMaster { address: String, reason: String },
     #[error("{address:?} is not an address of the form host:port")]
     Address { address: String },
     #[error("the master at {address} refused the job: {reason}")]
     Refused { address: String, reason: String },
+    #[error("the master at {address} cannot do the job: {reason}")]
+    Impossible { address: String, reason: String },
     #[error("the master at {address} could not do the job: {reason}")]
     JobFailed { address: String, reason: String },
     #[error("the master at {address} sent a path that cannot be right: {reason}")]
@@ -55,7 +54,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Core(e) | Self::Formats(horma_formats::Error::Core(e)) => of_core(e),
-            Self::Formats(horma_formats::Error::NoContact { .. }) => 3,
+            Self::Formats(horma_formats::Error::NoContact { .. }) | Self::Impossible { .. } => 3,
             Self::Master(horma_master::Error::Plan(e)) => of_core(e),
             Self::Formats(_)
             | Self::Bind { .. }
@@ -66,7 +65,7 @@ impl Error {
             Self::Master(_)
             | Self::Worker(_)
             | Self::Spawn { .. }
-            | Self::WorkerEnded { .. }
+            | Self::WorkersEnded { .. }
             | Self::NoMaster { .. }
             | Self::JobFailed { .. }
             | Self::BadReply { .. }
@@ -78,13 +77,5 @@ impl Error {
 
 /// The mathematics refuses either what it was given or what it would take.
 fn of_core(error: &horma_core::Error) -> u8 {
-    use horma_core::Error as E;
-    match error {
-        E::OutOfMemory { .. }
-        | E::ToleranceNotReached { .. }
-        | E::TooManyPositions { .. }
-        | E::GridTooLarge { .. }
-        | E::EmptyTravel { .. } => 3,
-        _ => 2,
-    }
+    if error.is_impossible() { 3 } else { 2 }
 }

@@ -1,10 +1,10 @@
 //! A run in this process.
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use horma_core::{Digitizer, Job, Part, Phase, Plan, Record, SubTrajectory, stitch};
 use horma_master::Outcome;
+use tokio_util::sync::CancellationToken;
 
 use crate::error::{Error, Result};
 use crate::progress::Display;
@@ -16,14 +16,14 @@ pub(crate) fn run(
     job: Job,
     threads: usize,
     display: &Display,
-    stop: &AtomicBool,
+    stop: &CancellationToken,
 ) -> Result<Outcome> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|e| Error::Threads(e.to_string()))?;
     pool.install(|| pipeline(part, job, display, stop))
 }
 
-fn pipeline(part: &Part, job: Job, display: &Display, stop: &AtomicBool) -> Result<Outcome> {
+fn pipeline(part: &Part, job: Job, display: &Display, stop: &CancellationToken) -> Result<Outcome> {
     let mut phases = Vec::new();
     let mut timed = |name: &'static str, begin: Instant| {
         phases.push(Phase {
@@ -50,10 +50,10 @@ fn pipeline(part: &Part, job: Job, display: &Display, stop: &AtomicBool) -> Resu
         done += touches.len() as u64;
         display.tell("digitize", done, total);
         parts.push(SubTrajectory { first, touches });
-        !stop.load(Ordering::Relaxed)
+        !stop.is_cancelled()
     });
     timed("digitize", begin);
-    if stop.load(Ordering::Relaxed) {
+    if stop.is_cancelled() {
         return Err(Error::Interrupted);
     }
 

@@ -2,102 +2,141 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use horma_core::{Job, Part, Phase, place};
+use horma_core::{Part, Phase, ToolPath, place};
 use horma_formats::job::{self, JobFile};
+use horma_formats::output::Staging;
 use horma_formats::report::{self, PathStatistics, Report};
 use horma_formats::{csv, gcode, output, part, preview};
 use horma_master::{Outcome, Progress};
 use horma_proto::VERSION;
+use tokio_util::sync::CancellationToken;
 
 use crate::args;
 use crate::error::{Error, Result};
 use crate::progress::Display;
-use crate::serve::runtime;
+use crate::serve::{NOTICE, runtime};
 use crate::{cluster, here, say, submit, system};
-
-/// How long threads may take to notice an interrupt before the process ends without them.
-const NOTICE: Duration = Duration::from_secs(2);
 
 /// Computes a job in this process or on local workers.
 pub(crate) fn run(args: &args::Run) -> Result<()> {
-    perform(&args.job, args.workers, |part, file, display| {
-        let threads = args.threads.map(usize::from);
-        let (workers, job) = (file.cluster.workers, file.job);
-        if workers == 0 {
-            let threads = threads.unwrap_or_else(system::cores);
-            return compute_here(part, job, threads, display);
-        }
-        let progress = progress(display);
-        interruptible(cluster::run(
-            part,
-            job,
-            workers,
-            threads.unwrap_or(1),
-            progress,
-        ))
-    })
+    perform(
+        &args.job,
+        args.workers,
+        async |part, file, display, stop| {
+            let threads = args.threads.map(usize::from);
+            let (workers, job) = (file.cluster.workers, file.job);
+            if workers == 0 {
+                let threads = threads.unwrap_or_else(system::cores);
+                let run = move || here::run(&part, job, threads, &display, &stop);
+                let run = tokio::task::spawn_blocking(run);
+                return run.await.unwrap_or(Err(Error::Interrupted));
+            }
+            let progress = progress(display);
+            cluster::run(part, job, workers, threads.unwrap_or(1), progress).await
+        },
+    )
 }
 
 /// Has a job computed by a master elsewhere.
 pub(crate) fn submit(args: &args::Submit) -> Result<()> {
-    perform(&args.job, None, |part, file, display| {
-        let progress = progress(display);
-        interruptible(submit::run(part, file.job, &args.master, progress))
+    perform(&args.job, None, async |part, file, display, _| {
+        submit::run(part, file.job, &args.master, progress(display)).await
     })
 }
 
-/// Reads a job, has it computed, and writes its results.
+/// Reads a job, has it computed, and writes its results; stops when it is interrupted.
 fn perform(
     args: &args::Job,
     workers: Option<u32>,
-    compute: impl FnOnce(Part, &JobFile, &Display) -> Result<Outcome>,
+    compute: impl AsyncFnOnce(Part, &JobFile, Display, CancellationToken) -> Result<Outcome>,
 ) -> Result<()> {
-    let file = job::read(&args.file, &args.overrides(workers))?;
-    output::prepare_dir(&args.output)?;
+    let runtime = runtime()?;
+    let stop = CancellationToken::new();
+    let stopping = stop.clone();
+    runtime.spawn(async move {
+        system::interrupted().await;
+        stopping.cancel();
+    });
     let display = Display::new(args.quiet);
-
-    display.tell("read", 0, 0);
-    let begin = Instant::now();
-    let (part, warnings) = part::read_all(&file.files)?;
-    let part = place(part, file.axis)?;
-    let read = phase("read", begin);
-    let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-    for warning in &warnings {
-        display.note(&format!("warning: {warning}"));
-    }
-
-    let (path, mut record) = compute(part.clone(), &file, &display)?;
-    record.phases.insert(0, read);
-
-    display.tell("write", 0, 0);
-    let begin = Instant::now();
-    let dir = args.output.as_path();
-    let echo = file.echo();
-    let heading = [
-        ("job", &*args.file.to_string_lossy()),
-        ("cutter", &described(&echo["cutter"])),
-    ];
-    // The program comes first: it alone can find the path of no use.
-    gcode::save(&dir.join(output::PROGRAM), &path, file.program, &heading)?;
-    csv::save(&dir.join(output::PATH), &path)?;
-    preview::save(&dir.join(output::PREVIEW), &part, &path)?;
-    record.phases.push(phase("write", begin));
-    let report = Report {
-        version: VERSION.to_owned(),
-        job: echo,
-        warnings,
-        path: PathStatistics::of(&path),
-        record,
-    };
-    report::save(&dir.join(output::REPORT), &report)?;
+    let performed = runtime.block_on(async {
+        let file = job::read(&args.file, &args.overrides(workers))?;
+        output::prepare_dir(&args.output)?;
+        display.tell("read", 0, 0);
+        let begin = Instant::now();
+        let (part, warnings) = part::read_all(&file.files)?;
+        let part = place(part, file.axis)?;
+        let read = phase("read", begin);
+        let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+        for warning in &warnings {
+            display.note(&format!("warning: {warning}"));
+        }
+        let (path, mut record) = tokio::select! {
+            biased;
+            // Dropping the computation stops whatever it started.
+            () = stop.cancelled() => return Err(Error::Interrupted),
+            outcome = compute(part.clone(), &file, display.clone(), stop.clone()) => outcome?,
+        };
+        record.phases.insert(0, read);
+        let report = Report {
+            version: VERSION.to_owned(),
+            job: file.echo(),
+            warnings,
+            path: PathStatistics::of(&path),
+            record,
+        };
+        write(args, &file, &part, &path, report, &display, &stop)
+    });
+    // Before anything else is said, and also if nothing good came of it.
     display.finish();
+    runtime.shutdown_timeout(NOTICE);
+    let report = performed?;
     if !args.quiet {
-        summarize(dir, &report);
+        summarize(&args.output, &report);
     }
     Ok(())
+}
+
+/// Writes all results, or none.
+fn write(
+    args: &args::Job,
+    file: &JobFile,
+    part: &Part,
+    path: &ToolPath,
+    mut report: Report,
+    display: &Display,
+    stop: &CancellationToken,
+) -> Result<Report> {
+    display.tell("write", 0, 0);
+    let begin = Instant::now();
+    let going_on = || {
+        if stop.is_cancelled() {
+            Err(Error::Interrupted)
+        } else {
+            Ok(())
+        }
+    };
+    let staging = Staging::begin(&args.output)?;
+    let heading = [
+        ("job", &*args.file.to_string_lossy()),
+        ("cutter", &described(&report.job["cutter"])),
+    ];
+    gcode::save(&staging.file(output::PROGRAM), path, file.program, &heading)?;
+    going_on()?;
+    csv::save(&staging.file(output::PATH), path)?;
+    going_on()?;
+    // Nobody turns a picture: a path without one is as good.
+    if let Err(error) = preview::save(&staging.file(output::PREVIEW), part, path) {
+        let warning = format!("there is no picture: {error}");
+        display.note(&format!("warning: {warning}"));
+        report.warnings.push(warning);
+    }
+    going_on()?;
+    report.record.phases.push(phase("write", begin));
+    report::save(&staging.file(output::REPORT), &report)?;
+    staging.publish()?;
+    Ok(report)
 }
 
 /// A table of the job in words.
@@ -116,8 +155,7 @@ fn phase(name: &str, begin: Instant) -> Phase {
     }
 }
 
-fn progress(display: &Display) -> Progress {
-    let display = display.clone();
+fn progress(display: Display) -> Progress {
     Arc::new(move |phase, done, total| display.tell(phase, done, total))
 }
 
@@ -140,36 +178,4 @@ fn summarize(dir: &Path, report: &Report) {
         dir.join(output::REPORT).display(),
         dir.join(output::PREVIEW).display(),
     ));
-}
-
-fn compute_here(part: Part, job: Job, threads: usize, display: &Display) -> Result<Outcome> {
-    let runtime = runtime()?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let outcome = runtime.block_on(async {
-        let (display, stopped) = (display.clone(), stop.clone());
-        let mut run =
-            tokio::task::spawn_blocking(move || here::run(&part, job, threads, &display, &stopped));
-        tokio::select! {
-            outcome = &mut run => outcome.unwrap_or(Err(Error::Interrupted)),
-            () = system::interrupted() => {
-                stop.store(true, Ordering::Relaxed);
-                Err(Error::Interrupted)
-            }
-        }
-    });
-    runtime.shutdown_timeout(NOTICE);
-    outcome
-}
-
-/// Runs until it is done or the user interrupts it; dropping it stops whatever it started.
-fn interruptible(run: impl Future<Output = Result<Outcome>>) -> Result<Outcome> {
-    let runtime = runtime()?;
-    let outcome = runtime.block_on(async {
-        tokio::select! {
-            outcome = run => outcome,
-            () = system::interrupted() => Err(Error::Interrupted),
-        }
-    });
-    runtime.shutdown_timeout(NOTICE);
-    outcome
 }

@@ -12,6 +12,9 @@ use crate::cluster::bind;
 use crate::error::{Error, Result};
 use crate::{say, system};
 
+/// How long threads may take to notice that the process ends.
+pub(crate) const NOTICE: Duration = Duration::from_secs(2);
+
 /// Serves as a master until it is told to stop.
 pub(crate) fn master(args: &Master) -> Result<()> {
     let config = Config {
@@ -22,7 +25,7 @@ pub(crate) fn master(args: &Master) -> Result<()> {
         max_part: args.max_part.saturating_mul(1_000_000),
         memory: system::memory(),
     };
-    runtime()?.block_on(async {
+    serve(async {
         let listener = listen(&args.bind, args.insecure).await?;
         let shutdown = CancellationToken::new();
         let (_master, serving) = horma_master::start(listener, config, shutdown.clone());
@@ -45,7 +48,7 @@ pub(crate) fn worker(args: Worker) -> Result<()> {
         threads: args.threads.map_or_else(system::cores, usize::from),
         patience: Duration::from_secs(args.patience),
     };
-    runtime()?.block_on(async {
+    serve(async {
         let listener = listen(&args.bind, args.insecure).await?;
         let shutdown = CancellationToken::new();
         let stopping = shutdown.clone();
@@ -55,6 +58,14 @@ pub(crate) fn worker(args: Worker) -> Result<()> {
         });
         Ok(horma_worker::run(listener, config, shutdown).await?)
     })
+}
+
+/// Serves to the end, and does not wait for threads that are still computing.
+fn serve(server: impl Future<Output = Result<()>>) -> Result<()> {
+    let runtime = runtime()?;
+    let served = runtime.block_on(server);
+    runtime.shutdown_timeout(NOTICE);
+    served
 }
 
 /// Listens, and prints where: with port 0 nobody could know otherwise.

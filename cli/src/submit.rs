@@ -105,6 +105,7 @@ fn refusal(address: &str, status: &Status) -> Error {
     let (address, reason) = (address.to_owned(), status.message().to_owned());
     match status.code() {
         Code::InvalidArgument | Code::OutOfRange => Error::Refused { address, reason },
+        Code::ResourceExhausted => Error::Impossible { address, reason },
         Code::Aborted | Code::FailedPrecondition => Error::JobFailed { address, reason },
         _ => Error::NoMaster {
             address,

@@ -116,7 +116,9 @@ impl Patch {
         let gradient = [by_d, pose.cos + pose.sin * by_z, pose.cos * by_z - pose.sin];
         let over_box: f64 = self.axes.iter().map(|&a| dot(gradient, a).abs()).sum();
         let plane = tangent.over([d, y, z]) + over_box;
-        Some(plane.min(circle) + slack)
+        // Steep planes magnify rounding; where they matter, the circle bounds better.
+        let steep = BOUND_SLACK * (tangent.rounding([d, y, z]) + over_box);
+        Some((plane + steep).min(circle) + slack)
     }
 }
 
@@ -134,7 +136,7 @@ pub(crate) fn facet_bound(cutter: &Cutter, pose: &Pose, corners: [Point; 3]) -> 
     let tangent = Tangent::near(cutter, middle(0), middle(2));
     let size = cutter.max_radius() + pose.x.abs() + w;
     let slack = BOUND_SLACK * (size + length(a) + length(b) + length(c));
-    let over = seen.map(|p| tangent.over(p));
+    let over = seen.map(|p| tangent.over(p) + BOUND_SLACK * tangent.rounding(p));
     Some(over[0].max(over[1]).max(over[2]) + slack)
 }
 
@@ -175,6 +177,12 @@ impl Tangent {
             by_d: m * growth / rise,
             by_z: -z / rise,
         }
+    }
+
+    /// What the rounding of [`Tangent::over`] is proportional to.
+    #[inline(always)]
+    fn rounding(&self, [d, _, z]: Point) -> f64 {
+        self.by_d.abs() * (d.abs() + self.d.abs()) + self.by_z.abs() * (z.abs() + self.z.abs())
     }
 
     /// F's upper bound at a point seen from the cutter.

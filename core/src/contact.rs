@@ -149,12 +149,23 @@ fn touch_edge(cutter: &Cutter, a: Point, b: Point) -> Option<(f64, f64)> {
     let step = sub(b, a);
     let (low, high) = within_reach(cutter, a, step)?;
     let slope = |t: f64| slope_sign(cutter, along(a, b, t), step);
+    let height = |t: f64| height_within(cutter, along(a, b, t));
     let t = maximum(low, high, slope);
-    Some((t, height_within(cutter, along(a, b, t))))
+    if t != low {
+        return Some((t, height(t)));
+    }
+    // Along the very end of the reach the slope's sign tells nothing: it is 0 throughout.
+    let (at_low, at_high) = (height(low), height(high));
+    Some(if at_high > at_low {
+        (high, at_high)
+    } else {
+        (low, at_low)
+    })
 }
 
 /// A number with the sign of F's slope along `step`: the slope times the roots in its denominators,
-/// so that it stays finite at the end of the reach.
+/// less what they have in common with the radius, so that it stays finite at the end of the reach
+/// and does not vanish there with the radius of a ball.
 #[inline(always)]
 fn slope_sign(cutter: &Cutter, [d, _, z]: Point, step: Point) -> f64 {
     match *cutter {
@@ -168,7 +179,8 @@ fn slope_sign(cutter: &Cutter, [d, _, z]: Point, step: Point) -> f64 {
             if step[0] == 0.0 {
                 return step[1] * rise - z * step[2];
             }
-            step[1] * rise * root - m * d * step[0] - z * step[2] * root
+            let share = if m > 0.0 { root / m } else { 1.0 };
+            step[1] * rise * share - d * step[0] - z * step[2] * share
         }
         Cutter::Cone { radius, slope, .. } => {
             let m = radius + d * slope;
@@ -182,20 +194,29 @@ fn slope_sign(cutter: &Cutter, [d, _, z]: Point, step: Point) -> f64 {
 /// position search (the Illinois variant) for the slope's zero.
 #[inline(always)]
 fn maximum(mut low: f64, mut high: f64, slope: impl Fn(f64) -> f64) -> f64 {
+    let span = high - low;
     let mut at_low = slope(low);
+    if at_low == 0.0 {
+        // At a cone's apex the sign vanishes with the radius; a hair further in it does not.
+        at_low = slope(low + HAIR * span);
+    }
     if at_low <= 0.0 {
         return low;
     }
     let mut at_high = slope(high);
+    if at_high == 0.0 {
+        at_high = slope(high - HAIR * span);
+    }
     if at_high >= 0.0 {
         return high;
     }
+    let enough = EDGE_SEARCH * span;
     let mut moved_low = None;
-    let mut last = low;
-    while high - low > EDGE_SEARCH {
+    let mut last = f64::NAN;
+    while high - low > enough {
         let t = low + (high - low) * (at_low / (at_low - at_high));
         let value = slope(t);
-        if value == 0.0 || (t - last).abs() <= EDGE_SEARCH {
+        if value == 0.0 || (t - last).abs() <= enough {
             return t;
         }
         last = t;
@@ -252,6 +273,9 @@ fn within_reach(cutter: &Cutter, a: Point, step: Point) -> Option<(f64, f64)> {
     let (low, high) = (low.max(0.0), high.min(1.0));
     (low <= high).then_some((low, high))
 }
+
+/// How far from an end a sign is looked for that the end does not give, as a fraction.
+const HAIR: f64 = 1.0e-6;
 
 const NOWHERE: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 const EVERYWHERE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -310,6 +334,10 @@ mod tests {
             size.clone().prop_map(Cutter::ball),
             (size.clone(), size.clone()).prop_map(|(a, b)| Cutter::cylinder(a, b)),
             (size, 0.5..4.0, -60.0..60.0).prop_map(|(a, b, c)| Cutter::cone(a + 4.0, b, c)),
+            Just(Cutter::torus(1e-9, 8.0)),
+            // Down to a point, or to within rounding of one.
+            Just(Cutter::cone(10.0, 20.0, 45.0)),
+            Just(Cutter::cone(10.0, 20.0, -45.0)),
         ]
         .prop_map(|c| c.expect("valid"))
     }
@@ -319,11 +347,15 @@ mod tests {
         prop_oneof![
             prop::array::uniform3(-30.0..30.0_f64),
             prop::array::uniform3(-6..6_i32).prop_map(|p| p.map(|c| f64::from(c) * 4.0)),
+            // Longer than any cutter is wide, and through the axis.
+            (-60..60_i32, -3..3_i32).prop_map(|(x, y)| [f64::from(x), f64::from(y) * 5.0, 0.0]),
         ]
     }
 
     fn poses() -> impl Strategy<Value = Pose> {
-        (-20.0..20.0, 0..360_i32).prop_map(|(x, degrees)| Pose {
+        let x = prop_oneof![-20.0..20.0, (-5..5_i32).prop_map(|x| f64::from(x) * 4.0)];
+        let degrees = prop_oneof![0..360_i32, Just(0), Just(180)];
+        (x, degrees).prop_map(|(x, degrees)| Pose {
             x,
             cos: libm::cos(f64::from(degrees).to_radians()),
             sin: libm::sin(f64::from(degrees).to_radians()),
@@ -365,6 +397,30 @@ mod tests {
                     let again = height_within(&cutter, seen);
                     prop_assert!((again - touch.height).abs() < 1e-5, "{again} {}", touch.height);
                 }
+            }
+        }
+    }
+
+    /// An edge across a ball or a cone with a point, in the plane of the axis, is touched in its
+    /// middle: its ends are the ends of the reach, where a slope is hard to tell.
+    #[test]
+    fn an_edge_through_the_axis_is_touched_where_the_cutter_is_widest() {
+        let level = |cutter: Cutter, x: f64| {
+            let pose = Pose {
+                x,
+                cos: 1.0,
+                sin: 0.0,
+            };
+            let corners = [[-50.0, 10.0, 0.0], [50.0, 10.0, 0.0], [0.0, -10.0, 0.0]];
+            touch_facet(&cutter, &pose, corners).map(|t| t.height)
+        };
+        for x in [0.0, 0.1, 7.7, -13.3] {
+            let ball = level(Cutter::ball(8.0).expect("valid"), x).expect("in reach");
+            assert!((ball - 18.0).abs() < 1e-9, "{ball}");
+            for angle in [45.0, -45.0] {
+                let cone = Cutter::cone(10.0, 20.0, angle).expect("valid");
+                let cone = level(cone, x).expect("in reach");
+                assert!((cone - 30.0).abs() < 1e-6, "{cone}");
             }
         }
     }

@@ -1,8 +1,8 @@
 //! Virtual digitizing: the height of every position of a run.
 //!
 //! Positions are independent of each other, so they are cut into chunks that threads take in turn.
-//! The winner of the last position and the one a revolution ago only tell where to look first: a
-//! chunk that starts without them finds the same winners.
+//! The winner of the last position only tells where to look first: a chunk that starts without it finds
+//! the same winners.
 
 use std::ops::Range;
 
@@ -81,14 +81,9 @@ impl Digitizer {
             let cost = match self.method {
                 Method::Brute => tree.try_all(&self.cutter, &pose, &mut best),
                 Method::Exact => {
-                    let done = winners.len();
-                    let last = done.checked_sub(1);
-                    let turn_ago = done.checked_sub(revolution as usize);
-                    for hint in [last, turn_ago].into_iter().flatten() {
-                        if let Some(winner) = &winners[hint] {
-                            tree.try_place(winner.place, &self.cutter, &pose, &mut best);
-                            counters.evaluations += 1;
-                        }
+                    if let Some(Some(last)) = winners.last() {
+                        tree.try_place(last.place, &self.cutter, &pose, &mut best);
+                        counters.evaluations += 1;
                     }
                     tree.search(&self.cutter, &pose, &mut best)
                 }

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use crate::error::{Error, Result};
 use crate::job::Discretization;
-use crate::part::{Mesh, Part, Shape};
+use crate::part::{Body, Mesh, Part, Shape};
 use crate::record::BodyRecord;
 use crate::refine::refine;
 use crate::row::{Facet, Outline, Row, RowKind, facets, outlines};
@@ -47,27 +47,65 @@ impl Model {
 /// # Errors
 /// [`Error::EmptyPart`], [`Error::GridTooLarge`] or [`Error::ToleranceNotReached`].
 pub fn discretize(part: &Part, discretization: Discretization) -> Result<Model> {
+    Ok(fill(&layout(part, discretization)?))
+}
+
+/// A body as it is going to be discretized.
+pub(crate) enum Layout<'a> {
+    Mesh(&'a str, &'a Mesh),
+    Grid(&'a str, Surface, Lines),
+}
+
+impl Layout<'_> {
+    /// Number of points, or of pairs of facets if these are more.
+    pub fn points(&self) -> f64 {
+        match self {
+            Self::Mesh(_, mesh) => mesh.vertices().len().max(mesh.triangles().len() / 2) as f64,
+            Self::Grid(_, _, grid) => grid.us.len() as f64 * grid.vs.len() as f64,
+        }
+    }
+}
+
+/// Decides on the lines of every grid, and makes none yet.
+pub(crate) fn layout(part: &Part, discretization: Discretization) -> Result<Vec<Layout<'_>>> {
     part.validate()?;
     discretization.validate()?;
+    let bodies = part.bodies.iter();
+    bodies
+        .map(|body| layout_body(body, discretization))
+        .collect()
+}
+
+fn layout_body(body: &Body, discretization: Discretization) -> Result<Layout<'_>> {
+    Ok(match &body.shape {
+        Shape::Mesh(mesh) => Layout::Mesh(&body.name, mesh),
+        Shape::Surface(surface) => {
+            let surface = surface.clone().along_x();
+            let grid = lines(&body.name, &surface, discretization)?;
+            Layout::Grid(&body.name, surface, grid)
+        }
+    })
+}
+
+/// Makes the rows that were laid out.
+pub(crate) fn fill(bodies: &[Layout]) -> Model {
     let mut model = Model::default();
-    for body in &part.bodies {
+    for body in bodies {
         let first_row = model.rows.len();
-        let (columns, deviation) = match &body.shape {
-            Shape::Mesh(mesh) => {
+        let (name, columns, deviation) = match body {
+            Layout::Mesh(name, mesh) => {
                 add_slabs(&mut model.rows, mesh);
-                (None, None)
+                (name, None, None)
             }
-            Shape::Surface(surface) => {
-                let surface = surface.clone().along_x();
-                let grid = lines(&body.name, &surface, discretization)?;
-                add_isolines(&mut model.rows, &surface, &grid);
-                (Some(grid.vs.len() as u32), grid.deviation)
+            Layout::Grid(name, surface, grid) => {
+                add_isolines(&mut model.rows, surface, grid);
+                (name, Some(grid.vs.len() as u32), grid.deviation)
             }
         };
         let rows = outlines(&model.rows[first_row..]);
         let x = rows.iter().fold(Interval::EMPTY, |x, r| x.hull(r.x));
         model.bodies.push(BodyRecord {
-            name: body.name.clone(),
+            name: (*name).to_owned(),
             rows: rows.len() as u32,
             columns,
             points: rows.iter().map(|r| r.points).sum(),
@@ -77,7 +115,7 @@ pub fn discretize(part: &Part, discretization: Discretization) -> Result<Model> 
         });
         model.outlines.extend(rows);
     }
-    Ok(model)
+    model
 }
 
 /// The parameters of a grid's lines.
@@ -160,7 +198,6 @@ fn add_slabs(rows: &mut Vec<Row>, mesh: &Mesh) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::part::Body;
     use crate::surface::tests::quarter_cylinder;
 
     fn part(shape: Shape) -> Part {

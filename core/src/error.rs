@@ -132,6 +132,16 @@ pub enum Error {
         /// Points in the row.
         points: usize,
     },
+    /// Two isolines of one surface that do not have the same number of points.
+    #[error("row {row} has {points} points, but the row it joins has {next}")]
+    UnequalRows {
+        /// Number of the first row in the part.
+        row: u32,
+        /// Its points.
+        points: usize,
+        /// The next row's.
+        next: usize,
+    },
     /// A spindle axis without a direction.
     #[error("the axis has the direction [{}, {}, {}], which has no length", direction[0], direction[1], direction[2])]
     NoDirection {
@@ -178,6 +188,20 @@ pub enum Error {
         /// Number of positions of the trajectory.
         positions: u64,
     },
+}
+
+impl Error {
+    /// Whether what was asked for is sound, but cannot be done: too much, too fine, or nothing at all.
+    pub fn is_impossible(&self) -> bool {
+        matches!(
+            self,
+            Self::OutOfMemory { .. }
+                | Self::ToleranceNotReached { .. }
+                | Self::TooManyPositions { .. }
+                | Self::GridTooLarge { .. }
+                | Self::EmptyTravel { .. }
+        )
+    }
 }
 
 /// The result of an operation of the core.

@@ -5,6 +5,7 @@
 //! `libm` crate, so that position i is the same bits on every machine.
 
 use crate::error::{Error, Result, bounded};
+use crate::tolerance::MAX_COORDINATE;
 use crate::vector::Interval;
 
 /// How travel and rotation go together.
@@ -50,6 +51,11 @@ pub struct Trajectory {
 /// hair, for exactly at the rim rounding would decide what is in reach.
 const OVERRUN: f64 = 1.0 - 1.0e-6;
 
+/// Smallest step, mm, and most positions in a revolution: with them, and with travel within bounds,
+/// successive positions are told apart and counted in a moment.
+const MIN_STEP: f64 = 1.0e-6;
+const MAX_POINTS_PER_REVOLUTION: u32 = 1_000_000;
+
 /// Most positions of a path: an index has to be exact in a double.
 const MAX_POSITIONS: f64 = 1.0e15;
 
@@ -63,18 +69,19 @@ impl Motion {
         bounded(
             "step",
             self.step,
-            self.step > 0.0 && self.step.is_finite(),
-            "greater than 0 mm",
+            (MIN_STEP..=MAX_COORDINATE).contains(&self.step),
+            "at least 0.000001 mm and at most a kilometre",
         )?;
         bounded(
             "points_per_revolution",
             f64::from(self.points_per_revolution),
-            self.points_per_revolution > 0,
-            "at least 1",
+            (1..=MAX_POINTS_PER_REVOLUTION).contains(&self.points_per_revolution),
+            "from 1 to 1000000",
         )?;
         for (name, value) in [("from", self.from), ("to", self.to)] {
             if let Some(value) = value {
-                bounded(name, value, value.is_finite(), "a finite number of mm")?;
+                let ok = value.abs() <= MAX_COORDINATE;
+                bounded(name, value, ok, "within a kilometre of the origin")?;
             }
         }
         match (self.from, self.to) {
@@ -147,10 +154,12 @@ impl Trajectory {
         360.0 * index as f64 / f64::from(self.points_per_revolution)
     }
 
-    /// `(cos θ, sin θ)` of each of the angles of one revolution, in order.
+    /// `(cos θ, sin θ)` of each of the angles of one revolution, in order; no more of them than there
+    /// are positions.
     pub fn directions(&self) -> Vec<(f64, f64)> {
         let ppr = f64::from(self.points_per_revolution);
-        (0..self.points_per_revolution)
+        let needed = u64::from(self.points_per_revolution).min(self.positions);
+        (0..needed as u32)
             .map(|i| {
                 let angle = 2.0 * std::f64::consts::PI * (f64::from(i) / ppr);
                 (libm::cos(angle), libm::sin(angle))
@@ -239,6 +248,14 @@ mod tests {
                 ..m
             },
             Motion { step: 1e-300, ..m },
+            Motion {
+                points_per_revolution: u32::MAX,
+                ..m
+            },
+            Motion {
+                to: Some(1e300),
+                ..m
+            },
         ] {
             assert!(bad.over(PART, 1.0).is_err(), "{bad:?}");
         }

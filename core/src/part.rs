@@ -55,9 +55,17 @@ impl Part {
         if empty { Err(Error::EmptyPart) } else { Ok(()) }
     }
 
+    /// Checks that every pole and vertex is finite and within bounds.
+    pub(crate) fn check_points(&self) -> Result<()> {
+        self.bodies.iter().try_for_each(|body| match &body.shape {
+            Shape::Surface(surface) => check_points(&body.name, "pole", surface.poles()),
+            Shape::Mesh(mesh) => check_points(&body.name, "vertex", mesh.vertices()),
+        })
+    }
+
     /// Applies `f` to every pole and vertex.
     #[must_use]
-    pub fn map_points(mut self, f: impl Fn(Point) -> Point) -> Self {
+    pub(crate) fn map_points(mut self, f: impl Fn(Point) -> Point) -> Self {
         for body in &mut self.bodies {
             let points = match &mut body.shape {
                 Shape::Surface(s) => &mut s.poles,

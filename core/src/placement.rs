@@ -36,7 +36,8 @@ impl Default for Axis {
 ///
 /// # Errors
 /// [`Error::NoDirection`] if the direction has no length or is not finite, [`Error::EmptyPart`] if
-/// the principal axis of nothing is asked for.
+/// the principal axis of nothing is asked for, [`Error::TooFar`] if the origin is so far from the part
+/// that its coordinates would be.
 pub fn place(part: Part, axis: Axis) -> Result<Part> {
     let (point, direction) = match axis {
         Axis::Through { point, direction } => (point, direction),
@@ -51,18 +52,26 @@ pub fn place(part: Part, axis: Axis) -> Result<Part> {
         });
     }
     let turn = turn_to_x(Vector3::from(x));
-    Ok(part.map_points(|p| (turn * Vector3::from(sub(p, point))).into()))
+    let placed = part.map_points(|p| (turn * Vector3::from(sub(p, point))).into());
+    placed.check_points()?;
+    Ok(placed)
 }
 
 /// The rotation by the smallest angle that takes the unit vector `a` to X.
 fn turn_to_x(a: Vector3<f64>) -> Matrix3<f64> {
-    if a.x <= -1.0 + 1e-12 {
+    let across = a.y * a.y + a.z * a.z;
+    if a.x < 0.0 && across == 0.0 {
         // Straight back: any half turn across X will do; the one about Z keeps Z up.
         return Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0));
     }
-    let axis = a.cross(&Vector3::x());
-    let k = axis.cross_matrix();
-    Matrix3::identity() + k + k * k / (1.0 + a.x)
+    let k = a.cross(&Vector3::x()).cross_matrix();
+    // 1 / (1 + a.x), without cancellation on either side.
+    let share = if a.x < 0.0 {
+        (1.0 - a.x) / across
+    } else {
+        1.0 / (1.0 + a.x)
+    };
+    Matrix3::identity() + k + k * k * share
 }
 
 /// Area-weighted centroid and direction of greatest extent. Surfaces are taken by their nets of
@@ -175,6 +184,7 @@ mod tests {
             [0.0, 1.0, 0.0],
             [-1.0, 0.0, 0.0],
             [-1.0, 1e-9, 0.0],
+            [-1.0, 1.5e-6, 0.5e-6],
             [1.0, -2.0, 3.0],
         ] {
             let axis = Axis::Through {
@@ -185,7 +195,7 @@ mod tests {
             for (p, q) in placed.iter().zip(&QUAD) {
                 assert!((length(*p) - length(*q)).abs() < 1e-9);
                 let along = crate::vector::dot(*q, unit(direction).expect("length"));
-                assert!((p[0] - along).abs() < 1e-7, "{direction:?}");
+                assert!((p[0] - along).abs() < 1e-9, "{direction:?}");
             }
         }
         let axis = Axis::Through {

@@ -1,6 +1,6 @@
 //! The plan: everything that follows from a part and a job before the first position is digitized.
 
-use crate::discretize::{Model, discretize};
+use crate::discretize::{Layout, Model, fill, layout};
 use crate::error::{Error, Result};
 use crate::extent::{Extent, split};
 use crate::job::{Discretization, Job};
@@ -29,23 +29,25 @@ impl Plan {
     /// Discretizes the part and lays out the positions, if that fits into `memory` bytes.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] before anything large is tried; those of [`discretize`] and of
+    /// [`Error::OutOfMemory`] before anything large is tried; those of [`crate::discretize`] and of
     /// [`crate::Motion::over`].
     pub fn new(part: &Part, job: Job, memory: u64) -> Result<Self> {
         part.validate()?;
         job.motion.validate()?;
         job.discretization.validate()?;
+        let half_width = job.cutter.half_width();
         // The net of poles holds its surface, so this is an upper bound, and it costs nothing.
-        let upper = job.motion.over(hull(part), job.cutter.half_width())?;
+        let upper = job.motion.over(hull(part), half_width)?;
         check_memory(points(part, job.discretization), upper.positions, memory)?;
-        let model = discretize(part, job.discretization)?;
+        let layout = layout(part, job.discretization)?;
+        let points = layout.iter().map(Layout::points).sum();
+        check_memory(points, upper.positions, memory)?;
+        let model = fill(&layout);
         let x = model
             .outlines
             .iter()
             .fold(Interval::EMPTY, |x, r| x.hull(r.x));
-        let trajectory = job.motion.over(x, job.cutter.half_width())?;
-        let points = model.outlines.iter().map(|o| o.points as f64).sum();
-        check_memory(points, trajectory.positions, memory)?;
+        let trajectory = job.motion.over(x, half_width)?;
         Ok(Self {
             job,
             model,
@@ -79,7 +81,7 @@ fn points(part: &Part, discretization: Discretization) -> f64 {
         .bodies
         .iter()
         .map(|b| match (&b.shape, discretization) {
-            (Shape::Mesh(mesh), _) => mesh.vertices().len() as f64,
+            (Shape::Mesh(mesh), _) => mesh.vertices().len().max(mesh.triangles().len() / 2) as f64,
             (Shape::Surface(_), Discretization::Grid { rows, columns }) => {
                 f64::from(rows) * f64::from(columns)
             }

@@ -73,6 +73,22 @@ impl Row {
         }
     }
 
+    /// Checks that the facets between this row and the next one held can be made.
+    ///
+    /// # Errors
+    /// [`Error::UnequalRows`] if they are joined isolines of different lengths.
+    pub fn validate_next(&self, next: &Self) -> Result<()> {
+        let joined = self.kind == RowKind::Isoline { joins_next: true } && next.id == self.id + 1;
+        if joined && self.points.len() != next.points.len() {
+            return Err(Error::UnequalRows {
+                row: self.id,
+                points: self.points.len(),
+                next: next.points.len(),
+            });
+        }
+        Ok(())
+    }
+
     /// Extent of the points along the spindle.
     fn x(&self) -> Interval {
         Interval::of(self.points.iter().map(|p| p[0]))

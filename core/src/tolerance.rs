@@ -12,6 +12,7 @@ pub const BOUND_SLACK: f64 = 1.0e-12;
 /// within reach of a contact must not be left out. Far above the rounding of any coordinate.
 pub const REACH_SLACK: f64 = 1.0e-9;
 
-/// A line search along a facet's edge stops once its bracket is this fraction of the edge. Near the
-/// maximum the height is flat, so the height's own error is of the order of this number's square.
+/// A line search along a facet's edge stops once it is this close, as a fraction of the edge's part
+/// within reach. Near a maximum inside that part the height is flat, so that its own error is of the
+/// order of this number's square.
 pub const EDGE_SEARCH: f64 = 1.0e-9;

@@ -332,15 +332,15 @@ impl Source<'_> {
                 &raw.feed,
                 "feed",
                 DEFAULT_FEED,
-                "greater than 0 mm/min",
-                |v| v > 0.0,
+                "greater than 0 and at most 1000000 mm/min",
+                |v| v > 0.0 && v <= 1.0e6,
             )?,
             clearance: number(
                 &raw.clearance,
                 "clearance",
                 DEFAULT_CLEARANCE,
-                "at least 0 mm",
-                |v| v >= 0.0,
+                "from 0 to 10000 mm",
+                |v| (0.0..=1.0e4).contains(&v),
             )?,
         })
     }

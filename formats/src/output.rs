@@ -2,7 +2,9 @@
 
 use std::fs::{self, Permissions};
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
 
 use crate::error::{Error, Result};
 
@@ -48,20 +50,54 @@ pub fn prepare_dir(dir: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Removes from `dir` what an earlier run left and this one did not write again, so that no stale
-/// program lies beside a new path. `written` are names out of [`FILES`].
-///
-/// # Errors
-/// [`Error::Io`] if a file cannot be removed.
-pub fn remove_stale(dir: &Path, written: &[&str]) -> Result<()> {
-    for name in FILES.iter().filter(|n| !written.contains(n)) {
-        let file = dir.join(name);
-        match fs::remove_file(&file) {
-            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(Error::io(&file, e)),
-            _ => {}
-        }
+/// Results on their way: they lie in a directory of their own and vanish with this value unless they
+/// are published, all at once.
+#[derive(Debug)]
+pub struct Staging {
+    dir: PathBuf,
+    staged: TempDir,
+}
+
+impl Staging {
+    /// Begins results for `dir`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if nothing can be created there.
+    pub fn begin(dir: &Path) -> Result<Self> {
+        let mut builder = tempfile::Builder::new();
+        let staged = builder.prefix(UNFINISHED).tempdir_in(dir);
+        Ok(Self {
+            dir: dir.to_owned(),
+            staged: staged.map_err(|source| Error::io(dir, source))?,
+        })
     }
-    Ok(())
+
+    /// Where to write the result called `name`, one of [`FILES`].
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.staged.path().join(name)
+    }
+
+    /// Moves every result to its place. What an earlier run left there and this one did not write
+    /// is removed, so that no stale program lies beside a new path.
+    ///
+    /// # Errors
+    /// [`Error::Io`], naming the file.
+    pub fn publish(self) -> Result<()> {
+        for name in FILES {
+            let target = self.dir.join(name);
+            let moved = match self.file(name) {
+                staged if staged.exists() => fs::rename(staged, &target),
+                _ => fs::remove_file(&target),
+            };
+            match moved {
+                Err(e) if e.kind() != io::ErrorKind::NotFound => {
+                    return Err(Error::io(&target, e));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Writes `file` with `contents`: into a file beside it that takes its name once it is whole.
@@ -164,8 +200,17 @@ mod tests {
         }
         fs::write(dir.join(".horma-killed"), "").expect("writable");
         prepare_dir(&dir).expect("ours");
-        remove_stale(&dir, &[PATH, REPORT]).expect("removable");
+        let dropped = Staging::begin(&dir).expect("writable");
+        fs::write(dropped.file(PATH), "never seen").expect("writable");
+        drop(dropped);
+        assert_eq!(fs::read(dir.join(PATH)).expect("there"), b"");
+        let staging = Staging::begin(&dir).expect("writable");
+        for name in [PATH, REPORT] {
+            fs::write(staging.file(name), "new").expect("writable");
+        }
+        staging.publish().expect("movable");
         assert_eq!(names(&dir), [".horma-killed", PATH, REPORT]);
+        assert_eq!(fs::read(dir.join(PATH)).expect("there"), b"new");
     }
 
     #[test]

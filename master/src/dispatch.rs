@@ -180,7 +180,13 @@ async fn receive(
                 let arrived = attempt.arrived.fetch_add(count, Ordering::Relaxed) + count;
                 (attempt.progress)("digitize", arrived, total);
             }
-            Some(Reply::Finished(finished)) if left == 0 => return Ok((finished, bytes)),
+            Some(Reply::Finished(finished)) if left == 0 => {
+                let seconds = finished.build_seconds + finished.digitize_seconds;
+                if !seconds.is_finite() {
+                    return Err(Fault::Wrong(format!("it worked for {seconds} s")));
+                }
+                return Ok((finished, bytes));
+            }
             Some(Reply::Finished(_)) => {
                 return Err(Fault::Wrong(format!(
                     "it finished with {left} positions left"

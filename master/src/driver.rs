@@ -88,12 +88,13 @@ impl Master {
         self.workers.clone()
     }
 
-    /// Runs a job on the workers there are, after waiting for `at_least` of them to register.
+    /// Runs a job on the workers there are, after waiting for `at_least` of them to register, or for
+    /// as long as the master's patience lasts.
     /// Dropping the future cancels the job.
     ///
     /// # Errors
-    /// [`Error::Plan`] if the job cannot be done at all, [`Error::NoWorkers`] if they do not come
-    /// in time, and whatever made it fail on the cluster.
+    /// [`Error::Plan`] if the job cannot be done at all, [`Error::NoWorkers`] if nobody comes in
+    /// time, and whatever made it fail on the cluster.
     pub async fn run(
         &self,
         part: Part,
@@ -144,6 +145,8 @@ impl Master {
         match tokio::time::timeout(self.config.patience, enough).await {
             Ok(Ok(count)) => Ok(*count as u32),
             Ok(Err(_)) => Err(Error::Interrupted),
+            // Those who came can do it.
+            Err(_) if *self.workers.borrow() > 0 => Ok(*self.workers.borrow() as u32),
             Err(_) => Err(Error::NoWorkers {
                 seconds: self.config.patience.as_secs(),
             }),
@@ -172,6 +175,8 @@ struct Driver {
 struct RunningJob {
     plan: Arc<Plan>,
     extents: Vec<Extent>,
+    /// How many extents need each row.
+    users: Vec<u32>,
     progress: Progress,
     /// Positions that have arrived.
     arrived: Arc<AtomicU64>,
@@ -188,13 +193,15 @@ impl Driver {
     async fn run(mut self, mut messages: mpsc::Receiver<Message>, shutdown: CancellationToken) {
         let mut ticks = tokio::time::interval(self.config.heartbeat / 2);
         loop {
+            // Messages before ticks: a heartbeat that waits must not be taken for silence.
             tokio::select! {
+                biased;
                 () = shutdown.cancelled() => break,
-                _ = ticks.tick() => self.tick(),
                 message = messages.recv() => match message {
                     Some(message) => self.handle(message),
                     None => break,
                 },
+                _ = ticks.tick() => self.tick(),
             }
             self.count.send_if_modified(|n| {
                 let now = self.state.workers();
@@ -269,9 +276,14 @@ impl Driver {
                 );
                 progress("digitize", 0, plan.trajectory.positions);
                 let count = extents.len() as u32;
+                let mut users = vec![0; plan.model.rows.len()];
+                for &row in extents.iter().flat_map(|e| &e.rows) {
+                    users[row as usize] += 1;
+                }
                 let running = RunningJob {
                     plan,
                     extents,
+                    users,
                     progress,
                     arrived: Arc::default(),
                     kept: BTreeMap::new(),
@@ -384,18 +396,13 @@ impl Driver {
         job.calls.insert(task, call);
         job.workers.insert(worker.clone(), address.clone());
         let extent = job.extents[task.extent as usize].clone();
-        let others: usize = job
-            .extents
-            .iter()
-            .filter(|e| e.id != extent.id)
-            .map(|e| shared(&e.rows, &extent.rows))
-            .sum();
+        let shared = |row: &&u32| job.users[**row as usize] > 1;
         let attempt = Attempt {
             task,
             worker: worker.clone(),
             address: address.clone(),
             plan: job.plan.clone(),
-            overlap_rows: others.min(extent.rows.len()) as u32,
+            overlap_rows: extent.rows.iter().filter(shared).count() as u32,
             extent,
             arrived: job.arrived.clone(),
             progress: job.progress.clone(),
@@ -415,11 +422,6 @@ impl Driver {
             }
         });
     }
-}
-
-/// How many ids two ordered lists share.
-fn shared(a: &[u32], b: &[u32]) -> usize {
-    a.iter().filter(|id| b.binary_search(id).is_ok()).count()
 }
 
 impl RunningJob {

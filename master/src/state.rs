@@ -4,14 +4,14 @@
 //! no data: time comes with the call, and positions stay with the driver. What must always hold is
 //! checked by the tests below over any order of events.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use horma_proto::TaskId;
 
 use crate::error::Error;
 
-/// Most attempts at one extent: past this it is the extent, not the workers.
+/// Attempts at one extent after which it is the extent, not the workers, if all of them had a try.
 const MAX_ATTEMPTS: u32 = 8;
 
 /// What the master knows.
@@ -35,15 +35,20 @@ struct Worker {
     task: Option<TaskId>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Extent {
-    /// Not being worked on; `attempts` so far came to nothing.
-    Waiting {
-        attempts: u32,
-    },
-    Running {
-        attempt: u32,
-    },
+#[derive(Debug, Clone, Default)]
+struct Extent {
+    status: Status,
+    /// How often it has been tried.
+    attempts: u32,
+    /// Who tried it in vain: others come first.
+    failed_by: BTreeSet<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Status {
+    #[default]
+    Waiting,
+    Running,
     Done,
 }
 
@@ -149,7 +154,7 @@ pub(crate) fn apply(state: &mut State, now: Duration, event: Event) -> Vec<Comma
         Event::Submitted { job, extents } => {
             state
                 .jobs
-                .insert(job, vec![Extent::Waiting { attempts: 0 }; extents as usize]);
+                .insert(job, vec![Extent::default(); extents as usize]);
             complete(state, job, &mut commands);
         }
         Event::Cancelled { job } => {
@@ -159,7 +164,7 @@ pub(crate) fn apply(state: &mut State, now: Duration, event: Event) -> Vec<Comma
         }
         Event::Delivered { worker, task } => {
             if free(state, &worker, task) {
-                set(state, task, Extent::Done);
+                set(state, task, Status::Done);
                 commands.push(Command::Keep { task });
                 complete(state, task.job, &mut commands);
             }
@@ -179,7 +184,7 @@ pub(crate) fn apply(state: &mut State, now: Duration, event: Event) -> Vec<Comma
     commands
 }
 
-/// A worker that registers anew has forgotten its task.
+/// A worker that started anew has forgotten its task; one that only registers again has not.
 fn register(
     state: &mut State,
     now: Duration,
@@ -188,6 +193,12 @@ fn register(
     commands: &mut Vec<Command>,
 ) {
     if state.distrusts(name, incarnation) {
+        return;
+    }
+    if let Some(worker) = state.workers.get_mut(name)
+        && worker.incarnation == incarnation
+    {
+        worker.seen = now;
         return;
     }
     let worker = Worker {
@@ -200,7 +211,7 @@ fn register(
     }) = state.workers.insert(name.to_owned(), worker)
     {
         let reason = format!("worker {name} started anew");
-        retry(state, task, reason.clone(), commands);
+        retry(state, name, task, reason.clone(), commands);
         commands.push(Command::Abort { task, reason });
     }
 }
@@ -225,7 +236,7 @@ fn expire(state: &mut State, now: Duration, commands: &mut Vec<Command>) {
             task: Some(task), ..
         }) = state.workers.remove(&name)
         {
-            retry(state, task, reason.clone(), commands);
+            retry(state, &name, task, reason.clone(), commands);
             commands.push(Command::Abort { task, reason });
         }
     }
@@ -256,15 +267,19 @@ fn lose(state: &mut State, name: &str, task: TaskId, fault: Fault, commands: &mu
         }
     };
     state.last_loss = Some(reason.clone());
-    retry(state, task, reason, commands);
+    retry(state, name, task, reason, commands);
 }
 
-/// Puts an extent back, unless it has been tried too often.
-fn retry(state: &mut State, task: TaskId, last: String, commands: &mut Vec<Command>) {
-    if task.attempt < MAX_ATTEMPTS {
-        let attempts = task.attempt;
-        set(state, task, Extent::Waiting { attempts });
-    } else {
+/// Puts an extent back, unless everybody has tried it, and that too often.
+fn retry(state: &mut State, worker: &str, task: TaskId, last: String, commands: &mut Vec<Command>) {
+    set(state, task, Status::Waiting);
+    let Some(extents) = state.jobs.get_mut(&task.job) else {
+        return;
+    };
+    let failed_by = &mut extents[task.extent as usize].failed_by;
+    failed_by.insert(worker.to_owned());
+    let someone_else = state.workers.keys().any(|w| !failed_by.contains(w));
+    if task.attempt >= MAX_ATTEMPTS && !someone_else {
         let error = Error::TooManyAttempts {
             extent: task.extent,
             attempts: task.attempt,
@@ -274,9 +289,9 @@ fn retry(state: &mut State, task: TaskId, last: String, commands: &mut Vec<Comma
     }
 }
 
-fn set(state: &mut State, task: TaskId, to: Extent) {
+fn set(state: &mut State, task: TaskId, to: Status) {
     if let Some(extents) = state.jobs.get_mut(&task.job) {
-        extents[task.extent as usize] = to;
+        extents[task.extent as usize].status = to;
     }
 }
 
@@ -298,7 +313,7 @@ fn release(state: &mut State, job: u64, reason: &str, commands: &mut Vec<Command
 }
 
 fn complete(state: &mut State, job: u64, commands: &mut Vec<Command>) {
-    let done = |extents: &Vec<Extent>| extents.iter().all(|e| *e == Extent::Done);
+    let done = |extents: &Vec<Extent>| extents.iter().all(|e| e.status == Status::Done);
     if state.jobs.get(&job).is_some_and(done) {
         state.jobs.remove(&job);
         commands.push(Command::Complete { job });
@@ -327,28 +342,42 @@ fn desert(state: &mut State, now: Duration, commands: &mut Vec<Command>) {
     }
 }
 
-/// Gives idle workers the extents that wait: oldest job first, lowest extent first.
+/// Gives the extents that wait to idle workers: oldest job first, lowest extent first, and to one that
+/// has failed an extent only if every member has.
 fn assign(state: &mut State, commands: &mut Vec<Command>) {
-    let idle = state.workers.iter_mut().filter(|(_, w)| w.task.is_none());
-    let waiting = state.jobs.iter_mut().flat_map(|(&job, extents)| {
-        (0u32..)
-            .zip(extents)
-            .filter_map(move |(extent, e)| match *e {
-                Extent::Waiting { attempts } => Some((job, extent, attempts, e)),
-                Extent::Running { .. } | Extent::Done => None,
-            })
-    });
-    for ((name, worker), (job, extent, attempts, slot)) in idle.zip(waiting) {
-        let attempt = attempts + 1;
-        let task = TaskId {
-            job,
-            extent,
-            attempt,
-        };
-        worker.task = Some(task);
-        *slot = Extent::Running { attempt };
-        let worker = name.clone();
-        commands.push(Command::Start { worker, task });
+    let members: Vec<String> = state.workers.keys().cloned().collect();
+    let mut idle: BTreeSet<&String> = members
+        .iter()
+        .filter(|name| state.workers[*name].task.is_none())
+        .collect();
+    for (&job, extents) in &mut state.jobs {
+        for (number, extent) in (0u32..).zip(extents) {
+            if idle.is_empty() {
+                return;
+            }
+            if extent.status != Status::Waiting {
+                continue;
+            }
+            let tried = |name: &String| extent.failed_by.contains(name);
+            let untried = idle.iter().copied().find(|name| !tried(name));
+            let anyone = || idle.first().copied().filter(|_| members.iter().all(tried));
+            let Some(name) = untried.or_else(anyone) else {
+                continue;
+            };
+            idle.remove(name);
+            extent.attempts += 1;
+            extent.status = Status::Running;
+            let task = TaskId {
+                job,
+                extent: number,
+                attempt: extent.attempts,
+            };
+            if let Some(worker) = state.workers.get_mut(name) {
+                worker.task = Some(task);
+            }
+            let worker = name.clone();
+            commands.push(Command::Start { worker, task });
+        }
     }
 }
 
@@ -398,25 +427,30 @@ mod tests {
                     running.insert((task.job, task.extent)),
                     "two workers, one extent"
                 );
-                let extent = state.jobs[&task.job][task.extent as usize];
-                let attempt = task.attempt;
-                assert_eq!(extent, Extent::Running { attempt });
+                let extent = &state.jobs[&task.job][task.extent as usize];
+                let expected = (Status::Running, task.attempt);
+                assert_eq!((extent.status, extent.attempts), expected);
             }
         }
         for (&job, extents) in &state.jobs {
             assert!(
-                extents.iter().any(|e| *e != Extent::Done),
+                extents.iter().any(|e| e.status != Status::Done),
                 "a job is over when it is done"
             );
             for (i, extent) in (0u32..).zip(extents) {
-                let is_running = matches!(extent, Extent::Running { .. });
+                let is_running = extent.status == Status::Running;
                 assert_eq!(
                     is_running,
                     running.contains(&(job, i)),
                     "running means someone runs it"
                 );
-                let idle = state.workers.values().any(|w| w.task.is_none());
-                let waits = matches!(extent, Extent::Waiting { .. });
+                let may = |name: &String| {
+                    let tried = |n: &String| extent.failed_by.contains(n);
+                    !tried(name) || state.workers.keys().all(tried)
+                };
+                let idle = |(name, w): (&String, &Worker)| w.task.is_none() && may(name);
+                let idle = state.workers.iter().any(idle);
+                let waits = extent.status == Status::Waiting;
                 assert!(!(waits && idle), "nobody idles while an extent waits");
             }
         }
@@ -487,7 +521,14 @@ mod tests {
                                 prop_assert!(kept.contains(&(job, extent)));
                             }
                         }
-                        Command::Fail { job, .. } => prop_assert!(ended.insert(job), "ended twice"),
+                        Command::Fail { job, error } => {
+                            prop_assert!(ended.insert(job), "ended twice");
+                            if let Error::TooManyAttempts { attempts, .. } = error {
+                                prop_assert!(attempts >= MAX_ATTEMPTS);
+                            } else {
+                                prop_assert!(state.workers.is_empty(), "someone is left");
+                            }
+                        }
                         Command::Abort { .. } => {}
                     }
                 }
@@ -551,6 +592,76 @@ mod tests {
             commands[..],
             [Command::Keep { .. }, Command::Complete { job: 1 }]
         ));
+    }
+
+    #[test]
+    fn registering_again_does_not_interrupt_a_task() {
+        let mut state = State::new(LEASE, Duration::ZERO);
+        let register = || Event::Registered {
+            worker: "a".to_owned(),
+            incarnation: 1,
+        };
+        apply(&mut state, Duration::ZERO, register());
+        let submitted = Event::Submitted { job: 1, extents: 1 };
+        apply(&mut state, Duration::ZERO, submitted);
+        let later = Duration::from_secs(9);
+        assert!(apply(&mut state, later, register()).is_empty());
+        let tick = apply(&mut state, Duration::from_secs(15), Event::Tick);
+        assert!(tick.is_empty(), "it was heard of at 9 s: {tick:?}");
+    }
+
+    /// A worker that says it is alive and cannot be reached must not use up an extent's attempts
+    /// while a good one is merely busy.
+    #[test]
+    fn a_worker_that_cannot_be_reached_does_not_fail_a_job() {
+        let mut state = State::new(LEASE, Duration::ZERO);
+        let now = Duration::ZERO;
+        for worker in ["bad", "good"] {
+            let worker = worker.to_owned();
+            let incarnation = 1;
+            apply(
+                &mut state,
+                now,
+                Event::Registered {
+                    worker,
+                    incarnation,
+                },
+            );
+        }
+        let submitted = Event::Submitted { job: 1, extents: 2 };
+        assert_eq!(
+            starts(&apply(&mut state, now, submitted)),
+            [("bad", 0, 1), ("good", 1, 1)]
+        );
+        for _ in 0..2 * MAX_ATTEMPTS {
+            let failed = Event::Failed {
+                worker: "bad".to_owned(),
+                task: TaskId {
+                    job: 1,
+                    extent: 0,
+                    attempt: 1,
+                },
+                fault: Fault::Lost("no route".to_owned()),
+            };
+            assert!(apply(&mut state, now, failed).is_empty());
+            let worker = "bad".to_owned();
+            let incarnation = 1;
+            let again = Event::Registered {
+                worker,
+                incarnation,
+            };
+            assert!(apply(&mut state, now, again).is_empty());
+        }
+        let delivered = Event::Delivered {
+            worker: "good".to_owned(),
+            task: TaskId {
+                job: 1,
+                extent: 1,
+                attempt: 1,
+            },
+        };
+        let commands = apply(&mut state, now, delivered);
+        assert_eq!(starts(&commands), [("good", 0, 2)]);
     }
 
     #[test]

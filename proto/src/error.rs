@@ -87,6 +87,7 @@ impl Error {
     /// NOT_FOUND and DATA_LOSS are worth another try, the latter with another worker.
     fn code(&self) -> Code {
         match self {
+            Self::Core(error) if error.is_impossible() => Code::ResourceExhausted,
             Self::Core(_) | Self::Missing { .. } | Self::Ragged { .. } | Self::Malformed(_) => {
                 Code::InvalidArgument
             }

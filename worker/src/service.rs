@@ -75,9 +75,12 @@ async fn receive(mut requests: Streaming<DigitizeRequest>) -> Result<Task, Statu
                 messages.push(&chunk)?;
                 while let Some(row) = messages.pop::<wire::Row>()? {
                     let row = horma_proto::row_from_wire(&row)?;
-                    if task.rows.last().is_some_and(|last| last.id >= row.id) {
-                        let why = format!("row {} comes out of order", row.id);
-                        return Err(Error::Malformed(why).into());
+                    if let Some(last) = task.rows.last() {
+                        if last.id >= row.id {
+                            let why = format!("row {} comes out of order", row.id);
+                            return Err(Error::Malformed(why).into());
+                        }
+                        last.validate_next(&row).map_err(Error::Core)?;
                     }
                     task.rows.push(row);
                 }

@@ -132,12 +132,12 @@ fn numbers_out_of_bounds_are_refused_at_their_key() {
     refused(
         "step = 2",
         "step = 0",
-        "step is 0, but must be greater than 0 mm",
+        "step is 0, but must be at least 0.000001 mm",
     );
     refused(
         "= 360",
         "= 0",
-        "points_per_revolution is 0, but must be at least 1",
+        "points_per_revolution is 0, but must be from 1 to 1000000",
     );
     refused(
         "= 360",
@@ -308,7 +308,8 @@ fn flags_take_the_place_of_the_file() {
         ..Overrides::default()
     };
     let error = job(JOB, &zero).expect_err("zero").to_string();
-    let given = "at least 1 (given as --points-per-revolution or HORMA_POINTS_PER_REVOLUTION)";
+    let given =
+        "from 1 to 1000000 (given as --points-per-revolution or HORMA_POINTS_PER_REVOLUTION)";
     assert!(error.ends_with(given), "{error}");
 }
 
