@@ -29,7 +29,7 @@ impl Plan {
     /// Discretizes the part and lays out the positions, if that fits into `memory` bytes.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`] before anything large is tried; those of [`crate::discretize`] and of
+    /// [`Error::OutOfMemory`] before anything large is tried; those of [`crate::discretize()`] and of
     /// [`crate::Motion::over`].
     pub fn new(part: &Part, job: Job, memory: u64) -> Result<Self> {
         part.validate()?;
