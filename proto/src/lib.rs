@@ -1,7 +1,7 @@
 //! The cluster's wire protocol.
 //!
-//! `cluster.proto` is the contract; [`wire`] is what is generated from it, [`convert`] takes it to
-//! and from the core's valid types, [`chunk`] cuts what is large. Whatever arrives is checked here:
+//! `cluster.proto` is the contract; [`wire`] is what is generated from it, `convert` takes it to
+//! and from the core's valid types, `chunk` cuts what is large. Whatever arrives is checked here:
 //! past this crate a value is as valid as one made in this process. This crate opens no connection.
 
 mod chunk;
