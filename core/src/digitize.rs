@@ -49,54 +49,6 @@ impl Digitizer {
         }
     }
 
-    /// Digitizes consecutive positions on this thread; the rows must hold everything that is in
-    /// reach from them.
-    pub fn run(
-        &self,
-        trajectory: &Trajectory,
-        directions: &[(f64, f64)],
-        positions: Range<u64>,
-    ) -> (Vec<Option<Touch>>, Counters) {
-        match &self.candidates {
-            Candidates::Points(tree) => self.run_on(tree, trajectory, directions, positions),
-            Candidates::Facets(tree) => self.run_on(tree, trajectory, directions, positions),
-        }
-    }
-
-    fn run_on<C: Candidate>(
-        &self,
-        tree: &Tree<C>,
-        trajectory: &Trajectory,
-        directions: &[(f64, f64)],
-        positions: Range<u64>,
-    ) -> (Vec<Option<Touch>>, Counters) {
-        let revolution = u64::from(trajectory.points_per_revolution);
-        let mut winners: Vec<Option<Winner>> = Vec::new();
-        let mut counters = Counters::default();
-        for index in positions {
-            let (cos, sin) = directions[(index % revolution) as usize];
-            let x = trajectory.travel(index);
-            let pose = Pose { x, cos, sin };
-            let mut best = None;
-            let cost = match self.method {
-                Method::Brute => tree.try_all(&self.cutter, &pose, &mut best),
-                Method::Exact => {
-                    if let Some(Some(last)) = winners.last() {
-                        tree.try_place(last.place, &self.cutter, &pose, &mut best);
-                        counters.evaluations += 1;
-                    }
-                    tree.search(&self.cutter, &pose, &mut best)
-                }
-            };
-            counters += cost;
-            winners.push(best);
-        }
-        (
-            winners.into_iter().map(|w| w.map(|w| w.touch)).collect(),
-            counters,
-        )
-    }
-
     /// Digitizes consecutive positions on the current thread pool, chunk by chunk, in order.
     /// `deliver` gets each chunk's first position and its touches; it returns `false` to stop.
     pub fn run_chunks(
@@ -117,7 +69,11 @@ impl Digitizer {
                 .into_par_iter()
                 .map(|start| {
                     let run = start..end.min(start + CHUNK);
-                    (start, self.run(trajectory, &directions, run))
+                    let done = match &self.candidates {
+                        Candidates::Points(tree) => self.run(tree, trajectory, &directions, run),
+                        Candidates::Facets(tree) => self.run(tree, trajectory, &directions, run),
+                    };
+                    (start, done)
                 })
                 .collect();
             for (start, (touches, cost)) in chunks {
@@ -129,5 +85,38 @@ impl Digitizer {
             next = end;
         }
         counters
+    }
+
+    /// Digitizes consecutive positions on this thread.
+    fn run<C: Candidate>(
+        &self,
+        tree: &Tree<C>,
+        trajectory: &Trajectory,
+        directions: &[(f64, f64)],
+        positions: Range<u64>,
+    ) -> (Vec<Option<Touch>>, Counters) {
+        let revolution = u64::from(trajectory.points_per_revolution);
+        let mut counters = Counters::default();
+        let mut last: Option<Winner> = None;
+        let touch = |index: u64| {
+            let (cos, sin) = directions[(index % revolution) as usize];
+            let x = trajectory.travel(index);
+            let pose = Pose { x, cos, sin };
+            let mut best = None;
+            let cost = match self.method {
+                Method::Brute => tree.try_all(&self.cutter, &pose, &mut best),
+                Method::Exact => {
+                    if let Some(last) = last {
+                        tree.try_place(last.place, &self.cutter, &pose, &mut best);
+                        counters.evaluations += 1;
+                    }
+                    tree.search(&self.cutter, &pose, &mut best)
+                }
+            };
+            counters += cost;
+            last = best;
+            best.map(|winner| winner.touch)
+        };
+        (positions.map(touch).collect(), counters)
     }
 }
