@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
+use horma_core::Simd;
 use horma_formats::job::Overrides;
 
 const AFTER_HELP: &str = "\
@@ -82,6 +83,10 @@ pub(crate) struct Run {
     /// Threads in this process [default: all cores], or in each local worker [default: 1]
     #[arg(long, value_name = "N", env = "HORMA_THREADS", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
+    /// Instruction set: scalar, avx2, avx512 or neon; the path does not depend on it [default: the
+    /// best there is]
+    #[arg(long, value_name = "SET", env = "HORMA_SIMD")]
+    pub simd: Option<Simd>,
 }
 
 #[derive(Debug, Args)]
@@ -255,6 +260,10 @@ pub(crate) struct Worker {
     /// Threads to digitize with [default: all cores]
     #[arg(long, value_name = "N", env = "HORMA_THREADS", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
+    /// Instruction set: scalar, avx2, avx512 or neon; the path does not depend on it [default: the
+    /// best there is]
+    #[arg(long, value_name = "SET", env = "HORMA_SIMD")]
+    pub simd: Option<Simd>,
     /// How long to look for a master that is not there, or not there any more, seconds
     #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
     pub patience: u64,

@@ -4,7 +4,7 @@
 use std::process::Stdio;
 use std::time::Duration;
 
-use horma_core::{Job, Part};
+use horma_core::{Job, Part, Simd};
 use horma_master::{Config, Outcome, Progress};
 use tokio::net::TcpListener;
 use tokio::process::{Child, Command};
@@ -31,6 +31,7 @@ pub(crate) async fn run(
     job: Job,
     workers: u32,
     threads: usize,
+    simd: Simd,
     progress: Progress,
 ) -> Result<Outcome> {
     let listener = bind("127.0.0.1:0").await?;
@@ -52,7 +53,7 @@ pub(crate) async fn run(
     // Each child belongs to a task that waits for its end; dropping the set kills them all.
     let mut children = JoinSet::new();
     for i in 1..=workers {
-        let mut child = spawn(&format!("local-{i}"), &address.to_string(), threads)?;
+        let mut child = spawn(&format!("local-{i}"), &address.to_string(), threads, simd)?;
         children.spawn(async move {
             match child.wait().await {
                 Ok(status) => status.to_string(),
@@ -84,7 +85,7 @@ async fn everybody_there(
     }
 }
 
-fn spawn(id: &str, master: &str, threads: usize) -> Result<Child> {
+fn spawn(id: &str, master: &str, threads: usize, simd: Simd) -> Result<Child> {
     let failed = |program: std::path::PathBuf, source| Error::Spawn { program, source };
     let program = std::env::current_exe().map_err(|e| failed("horma".into(), e))?;
     let mut command = Command::new(&program);
@@ -92,6 +93,7 @@ fn spawn(id: &str, master: &str, threads: usize) -> Result<Child> {
         .args(["worker", "--master", master, "--id", id])
         .args(["--bind", "127.0.0.1:0", "--patience", WORKER_PATIENCE])
         .args(["--threads", &threads.to_string()])
+        .args(["--simd", &simd.to_string()])
         .env_remove("HORMA_ADVERTISE")
         .stdin(Stdio::null())
         .stdout(Stdio::null())

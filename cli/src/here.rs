@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use horma_core::{Digitizer, Job, Part, Phase, Plan, Record, SubTrajectory, stitch};
+use horma_core::{Digitizer, Job, Part, Phase, Plan, Record, Simd, SubTrajectory, stitch};
 use horma_master::Outcome;
 use tokio_util::sync::CancellationToken;
 
@@ -15,15 +15,22 @@ pub(crate) fn run(
     part: &Part,
     job: Job,
     threads: usize,
+    simd: Simd,
     display: &Display,
     stop: &CancellationToken,
 ) -> Result<Outcome> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|e| Error::Threads(e.to_string()))?;
-    pool.install(|| pipeline(part, job, display, stop))
+    pool.install(|| pipeline(part, job, simd, display, stop))
 }
 
-fn pipeline(part: &Part, job: Job, display: &Display, stop: &CancellationToken) -> Result<Outcome> {
+fn pipeline(
+    part: &Part,
+    job: Job,
+    simd: Simd,
+    display: &Display,
+    stop: &CancellationToken,
+) -> Result<Outcome> {
     let mut phases = Vec::new();
     let mut timed = |name: &'static str, begin: Instant| {
         phases.push(Phase {
@@ -38,7 +45,7 @@ fn pipeline(part: &Part, job: Job, display: &Display, stop: &CancellationToken) 
 
     display.tell("build", 0, 0);
     let begin = Instant::now();
-    let digitizer = Digitizer::new(&job, &plan.model.rows);
+    let digitizer = Digitizer::new(&job, &plan.model.rows, simd);
     timed("build", begin);
 
     let total = plan.trajectory.positions;

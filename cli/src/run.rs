@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use horma_core::{Part, Phase, ToolPath, place};
+use horma_core::{Part, Phase, Simd, ToolPath, place};
 use horma_formats::job::{self, JobFile};
 use horma_formats::output::Staging;
 use horma_formats::report::{self, PathStatistics, Report};
@@ -26,15 +26,16 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
         args.workers,
         async |part, file, display, stop| {
             let threads = args.threads.map(usize::from);
+            let simd = args.simd.unwrap_or_else(Simd::best);
             let (workers, job) = (file.cluster.workers, file.job);
             if workers == 0 {
                 let threads = threads.unwrap_or_else(system::cores);
-                let run = move || here::run(&part, job, threads, &display, &stop);
+                let run = move || here::run(&part, job, threads, simd, &display, &stop);
                 let run = tokio::task::spawn_blocking(run);
                 return run.await.unwrap_or(Err(Error::Interrupted));
             }
             let progress = progress(display);
-            cluster::run(part, job, workers, threads.unwrap_or(1), progress).await
+            cluster::run(part, job, workers, threads.unwrap_or(1), simd, progress).await
         },
     )
 }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use horma_core::Simd;
 use horma_master::Config;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
@@ -46,6 +47,7 @@ pub(crate) fn worker(args: Worker) -> Result<()> {
         incarnation: system::incarnation(),
         advertise: args.advertise,
         threads: args.threads.map_or_else(system::cores, usize::from),
+        simd: args.simd.unwrap_or_else(Simd::best),
         patience: Duration::from_secs(args.patience),
     };
     serve(async {

@@ -10,7 +10,7 @@
 
 use crate::cutter::Cutter;
 use crate::path::Touch;
-use crate::tolerance::EDGE_SEARCH;
+use crate::tolerance::{BOUND_SLACK, EDGE_SEARCH, WELL_WITHIN};
 use crate::vector::{Point, add_scaled, cross, length, sub};
 
 /// Where part and cutter stand at one position.
@@ -36,8 +36,9 @@ impl Pose {
     }
 }
 
-/// The height at which the cutter touches point `p`, or `None` out of reach.
-#[inline(always)]
+/// The height at which the cutter touches point `p`, or `None` out of reach: what `lanes` computes for
+/// eight.
+#[cfg(test)]
 pub fn touch_point(cutter: &Cutter, pose: &Pose, p: Point) -> Option<Touch> {
     let [d, y, z] = pose.face(p);
     let m = cutter.profile(d)?;
@@ -47,10 +48,44 @@ pub fn touch_point(cutter: &Cutter, pose: &Pose, p: Point) -> Option<Touch> {
     })
 }
 
+/// A height that the cutter is surely touched at or above, given a place on the part, or minus infinity.
+#[inline(always)]
+pub fn least_height(cutter: &Cutter, pose: &Pose, contact: Point) -> f64 {
+    let [d, y, z] = pose.face(contact);
+    // Rounding has put the contact beside its facet, which matters where F is steep.
+    let within = WELL_WITHIN * cutter.half_width();
+    match cutter.profile(d) {
+        Some(m) if d.abs() <= within && z.abs() <= WELL_WITHIN * m => {
+            let size = cutter.max_radius() + y.abs() + pose.x.abs();
+            y + ((m - z) * (m + z)).sqrt() - FLOOR_SLACK * size
+        }
+        _ => f64::NEG_INFINITY,
+    }
+}
+
+/// What rounding may take from the height at a contact, relative to the lengths involved.
+const FLOOR_SLACK: f64 = 64.0 * BOUND_SLACK;
+
 /// The greatest height over a facet, or `None` if no point of it is in reach.
 pub fn touch_facet(cutter: &Cutter, pose: &Pose, corners: [Point; 3]) -> Option<Touch> {
-    let seen = corners.map(|p| pose.face(p));
-    if let Some((s, t)) = support_on(cutter, seen) {
+    touch_seen(
+        cutter,
+        corners,
+        corners.map(|p| pose.face(p)),
+        f64::NEG_INFINITY,
+    )
+}
+
+/// The same, given how the cutter sees the corners; also `None` if that is surely below `floor`.
+#[inline]
+pub fn touch_seen(
+    cutter: &Cutter,
+    corners: [Point; 3],
+    seen: [Point; 3],
+    floor: f64,
+) -> Option<Touch> {
+    let weights = weights_of_support(cutter, seen);
+    if let Some([_, s, t]) = weights.filter(|w| w.iter().all(|&w| w >= 0.0)) {
         let at =
             |c: [Point; 3]| add_scaled(add_scaled(c[0], s, sub(c[1], c[0])), t, sub(c[2], c[0]));
         return Some(Touch {
@@ -59,8 +94,12 @@ pub fn touch_facet(cutter: &Cutter, pose: &Pose, corners: [Point; 3]) -> Option<
         });
     }
     let mut best: Option<Touch> = None;
-    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-        let Some((t, height)) = touch_edge(cutter, seen[i], seen[j]) else {
+    for (opposite, i, j) in [(2, 0, 1), (0, 1, 2), (1, 2, 0)] {
+        // F rises towards the support point, so that only edges which face it can be touched.
+        if weights.is_some_and(|w| w[opposite] > FACING) {
+            continue;
+        }
+        let Some((t, height)) = touch_edge(cutter, seen[i], seen[j], floor) else {
             continue;
         };
         if best.is_none_or(|b| height > b.height) {
@@ -71,15 +110,19 @@ pub fn touch_facet(cutter: &Cutter, pose: &Pose, corners: [Point; 3]) -> Option<
     best
 }
 
-/// Where on the facet, as weights of the edges from its first corner, the cutter's support point
-/// for the facet's normal falls; `None` if it falls beside it or if the facet stands upright.
+/// Greatest weight of the opposite corner with which an edge counts as facing the support point: above
+/// the rounding of a weight.
+const FACING: f64 = 1.0e-3;
+
+/// Where the cutter's support point for the facet's normal falls in the facet's plane, as weights of
+/// its corners; `None` if the facet stands upright.
 #[inline(always)]
-fn support_on(cutter: &Cutter, [a, b, c]: [Point; 3]) -> Option<(f64, f64)> {
+fn weights_of_support(cutter: &Cutter, [a, b, c]: [Point; 3]) -> Option<[f64; 3]> {
     let (ab, ac) = (sub(b, a), sub(c, a));
     let n = cross(ab, ac);
     // An upright facet is touched along its edges alone; with a tilt below this the weights would
     // be noise.
-    if n[1].abs() <= 1.0e-9 * length(n) {
+    if n[1].abs() <= UPRIGHT * length(n) {
         return None;
     }
     let up = if n[1] > 0.0 { n } else { [-n[0], -n[1], -n[2]] };
@@ -87,8 +130,11 @@ fn support_on(cutter: &Cutter, [a, b, c]: [Point; 3]) -> Option<(f64, f64)> {
     let (d, z) = (d - a[0], z - a[2]);
     let s = (z * ac[0] - d * ac[2]) / n[1];
     let t = (d * ab[2] - z * ab[0]) / n[1];
-    (s >= 0.0 && t >= 0.0 && s + t <= 1.0).then_some((s, t))
+    Some([1.0 - s - t, s, t])
 }
+
+/// Tilt of a facet, as the share of its normal along the attack axis, below which it stands upright.
+const UPRIGHT: f64 = 1.0e-6;
 
 /// `(d, z)` of the point where the cutter, coming down, first meets a plane whose normal is `n`,
 /// `n[1] > 0`.
@@ -144,13 +190,18 @@ fn along(a: Point, b: Point, t: f64) -> Point {
 }
 
 /// Where on the edge from `a` to `b`, seen from the cutter, its height is greatest, from 0 to 1, and
-/// that height.
-fn touch_edge(cutter: &Cutter, a: Point, b: Point) -> Option<(f64, f64)> {
+/// that height; also `None` if that is surely below `floor`.
+#[inline]
+fn touch_edge(cutter: &Cutter, a: Point, b: Point, floor: f64) -> Option<(f64, f64)> {
     let step = sub(b, a);
-    let (low, high) = within_reach(cutter, a, step)?;
-    let slope = |t: f64| slope_sign(cutter, along(a, b, t), step);
+    let (low, high) = if in_reach(cutter, a) && in_reach(cutter, b) {
+        (0.0, 1.0)
+    } else {
+        within_reach(cutter, a, step)?
+    };
+    let rise = |t: f64| Rise::at(cutter, along(a, b, t), step);
+    let t = maximum(low, high, rise, floor)?;
     let height = |t: f64| height_within(cutter, along(a, b, t));
-    let t = maximum(low, high, slope);
     if t != low {
         return Some((t, height(t)));
     }
@@ -163,63 +214,110 @@ fn touch_edge(cutter: &Cutter, a: Point, b: Point) -> Option<(f64, f64)> {
     })
 }
 
-/// A number with the sign of F's slope along `step`: the slope times the roots in its denominators,
-/// less what they have in common with the radius, so that it stays finite at the end of the reach
-/// and does not vanish there with the radius of a ball.
+/// Whether a point seen from the cutter is within its reach.
 #[inline(always)]
-fn slope_sign(cutter: &Cutter, [d, _, z]: Point, step: Point) -> f64 {
-    match *cutter {
-        Cutter::Torus {
-            major_radius,
-            minor_radius,
-        } => {
-            let root = ((minor_radius - d) * (minor_radius + d)).max(0.0).sqrt();
-            let m = major_radius + root;
-            let rise = ((m - z) * (m + z)).max(0.0).sqrt();
-            if step[0] == 0.0 {
-                return step[1] * rise - z * step[2];
+fn in_reach(cutter: &Cutter, [d, _, z]: Point) -> bool {
+    cutter.profile(d).is_some_and(|m| z.abs() <= m)
+}
+
+/// F along an edge, at one place of it.
+struct Rise {
+    /// F's slope times `scale`: it stays finite at the end of the reach, and does not vanish there with
+    /// the radius of a ball.
+    sign: f64,
+    scale: f64,
+    height: f64,
+}
+
+impl Rise {
+    /// At a point seen from the cutter, along `step`.
+    #[inline(always)]
+    fn at(cutter: &Cutter, [d, y, z]: Point, step: Point) -> Self {
+        match *cutter {
+            Cutter::Torus {
+                major_radius,
+                minor_radius,
+            } => {
+                let root = ((minor_radius - d) * (minor_radius + d)).max(0.0).sqrt();
+                let m = major_radius + root;
+                let rise = ((m - z) * (m + z)).max(0.0).sqrt();
+                let height = y + rise;
+                if step[0] == 0.0 {
+                    return Self {
+                        sign: step[1] * rise - z * step[2],
+                        scale: rise,
+                        height,
+                    };
+                }
+                let share = if m > 0.0 { root / m } else { 1.0 };
+                Self {
+                    sign: step[1] * rise * share - d * step[0] - z * step[2] * share,
+                    scale: rise * share,
+                    height,
+                }
             }
-            let share = if m > 0.0 { root / m } else { 1.0 };
-            step[1] * rise * share - d * step[0] - z * step[2] * share
+            Cutter::Cone { radius, slope, .. } => {
+                let m = radius + d * slope;
+                let rise = ((m - z) * (m + z)).max(0.0).sqrt();
+                Self {
+                    sign: step[1] * rise + m * slope * step[0] - z * step[2],
+                    scale: rise,
+                    height: y + rise,
+                }
+            }
         }
-        Cutter::Cone { radius, slope, .. } => {
-            let m = radius + d * slope;
-            let rise = ((m - z) * (m + z)).max(0.0).sqrt();
-            step[1] * rise + m * slope * step[0] - z * step[2]
-        }
+    }
+
+    /// Whether F, being concave, stays surely below `floor` as far as `reach` along the edge.
+    #[inline(always)]
+    fn stays_below(&self, floor: f64, reach: f64) -> bool {
+        // Multiplied by the scale; where that vanishes nothing is sure.
+        let missing = (floor - self.height) * self.scale;
+        let gain = self.sign.abs() * reach;
+        let rounding = BOUND_SLACK * ((floor.abs() + self.height.abs()) * self.scale + gain);
+        missing > gain * (1.0 + 1.0e-9) + 64.0 * rounding
     }
 }
 
-/// Where in `[low, high]` a concave function is greatest, given the sign of its slope: a false
-/// position search (the Illinois variant) for the slope's zero.
+/// Where in `[low, high]` a concave function is greatest, given its slope: a false position search
+/// (the Illinois variant) for the slope's zero. `None` if it is surely below `floor`.
 #[inline(always)]
-fn maximum(mut low: f64, mut high: f64, slope: impl Fn(f64) -> f64) -> f64 {
+fn maximum(mut low: f64, mut high: f64, rise: impl Fn(f64) -> Rise, floor: f64) -> Option<f64> {
     let span = high - low;
+    let slope = |t: f64| rise(t).sign;
     let mut at_low = slope(low);
     if at_low == 0.0 {
         // At a cone's apex the sign vanishes with the radius; a hair further in it does not.
         at_low = slope(low + HAIR * span);
     }
     if at_low <= 0.0 {
-        return low;
+        return Some(low);
     }
     let mut at_high = slope(high);
     if at_high == 0.0 {
         at_high = slope(high - HAIR * span);
     }
     if at_high >= 0.0 {
-        return high;
+        return Some(high);
     }
     let enough = EDGE_SEARCH * span;
     let mut moved_low = None;
     let mut last = f64::NAN;
     while high - low > enough {
         let t = low + (high - low) * (at_low / (at_low - at_high));
-        let value = slope(t);
-        if value == 0.0 || (t - last).abs() <= enough {
-            return t;
+        if (t - last).abs() <= enough {
+            return Some(t);
+        }
+        let here = rise(t);
+        let value = here.sign;
+        if value == 0.0 {
+            return Some(t);
         }
         last = t;
+        let reach = if value > 0.0 { high - t } else { t - low };
+        if here.stays_below(floor, reach) {
+            return None;
+        }
         if value > 0.0 {
             (low, at_low) = (t, value);
             if moved_low == Some(true) {
@@ -234,7 +332,7 @@ fn maximum(mut low: f64, mut high: f64, slope: impl Fn(f64) -> f64) -> f64 {
             moved_low = Some(false);
         }
     }
-    low + (high - low) * 0.5
+    Some(low + (high - low) * 0.5)
 }
 
 /// The part `[low, high]` of `[0, 1]` for which `a + t·step` is within the cutter's reach.

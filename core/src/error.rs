@@ -59,6 +59,14 @@ pub enum Error {
         /// Most rows, and most columns.
         limit: usize,
     },
+    /// An instruction set that is unknown or that this machine lacks.
+    #[error("{name:?} is no instruction set of this machine, which has {}", available.join(", "))]
+    NoSuchSimd {
+        /// The name that was given.
+        name: String,
+        /// Those that could be given.
+        available: Vec<String>,
+    },
     /// A job that would not fit into memory.
     #[error("the job has {points} points and {positions} positions, which would take {:.1} GB of memory where {:.1} GB are available; choose a coarser grid or tolerance, a larger step or fewer points per revolution", needed / 1e9, *available as f64 / 1e9)]
     OutOfMemory {

@@ -26,11 +26,18 @@ mod row;
 mod extent;
 mod plan;
 
+mod simd;
+
 mod contact;
+mod lanes;
 
 mod bound;
 
+mod blocks;
+mod leaf;
 mod tree;
+
+mod sweep;
 
 mod digitize;
 
@@ -51,6 +58,7 @@ pub use placement::{Axis, place};
 pub use plan::Plan;
 pub use record::{BodyRecord, Counters, ExtentRecord, LostAttempt, Phase, Record, WorkerRecord};
 pub use row::{Outline, Row, RowKind};
+pub use simd::Simd;
 pub use surface::{Direction, MAX_DEGREE, Surface};
 pub use tolerance::MAX_COORDINATE;
 pub use vector::{Interval, Point, cross, dot, length, sub, unit};

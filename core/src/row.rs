@@ -106,33 +106,43 @@ pub(crate) struct Facet {
     pub corners: [u32; 3],
 }
 
-/// The facets of rows that are in order of their ids; between isolines only where both are there.
-pub(crate) fn facets(rows: &[Row]) -> impl Iterator<Item = Facet> {
+/// Where the points of each row begin among the points of all of them.
+pub(crate) fn starts(rows: &[Row]) -> Vec<u32> {
     let starts = rows.iter().scan(0u32, |sum, row| {
         let start = *sum;
         *sum += row.points.len() as u32;
         Some(start)
     });
-    starts.enumerate().flat_map(move |(i, start)| {
-        let row = &rows[i];
-        let next = rows.get(i + 1).filter(|next| next.id == row.id + 1);
-        let (slab, columns) = match (&row.kind, next) {
-            (RowKind::Slab { facets }, _) => (&facets[..], 0),
-            (RowKind::Isoline { joins_next: true }, Some(_)) => (&[][..], row.points.len() as u32),
-            (RowKind::Isoline { .. }, _) => (&[][..], 0),
-        };
-        let own = slab.iter().map(move |f| f.map(|c| start + c));
-        let between = (1..columns).flat_map(move |k| {
-            let (a, b) = (start + k, start + columns + k);
-            [[a - 1, b - 1, b], [a - 1, b, a]]
-        });
-        let all = own.chain(between).enumerate();
-        all.map(move |(number, corners)| Facet {
-            row: i,
-            number,
-            corners,
+    starts.collect()
+}
+
+/// The facets of rows that are in order of their ids; between isolines only where both are there.
+pub(crate) fn facets(rows: &[Row]) -> impl Iterator<Item = Facet> {
+    starts(rows)
+        .into_iter()
+        .enumerate()
+        .flat_map(move |(i, start)| {
+            let row = &rows[i];
+            let next = rows.get(i + 1).filter(|next| next.id == row.id + 1);
+            let (slab, columns) = match (&row.kind, next) {
+                (RowKind::Slab { facets }, _) => (&facets[..], 0),
+                (RowKind::Isoline { joins_next: true }, Some(_)) => {
+                    (&[][..], row.points.len() as u32)
+                }
+                (RowKind::Isoline { .. }, _) => (&[][..], 0),
+            };
+            let own = slab.iter().map(move |f| f.map(|c| start + c));
+            let between = (1..columns).flat_map(move |k| {
+                let (a, b) = (start + k, start + columns + k);
+                [[a - 1, b - 1, b], [a - 1, b, a]]
+            });
+            let all = own.chain(between).enumerate();
+            all.map(move |(number, corners)| Facet {
+                row: i,
+                number,
+                corners,
+            })
         })
-    })
 }
 
 /// The outlines of a body's rows, which must be complete and in order.

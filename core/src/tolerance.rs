@@ -16,3 +16,7 @@ pub const REACH_SLACK: f64 = 1.0e-9;
 /// within reach. Near a maximum inside that part the height is flat, so that its own error is of the
 /// order of this number's square.
 pub const EDGE_SEARCH: f64 = 1.0e-9;
+
+/// How far out tangent planes are taken, as a fraction of the reach: at its end their slopes are
+/// infinite.
+pub const WELL_WITHIN: f64 = 0.98;

@@ -1,337 +1,357 @@
 //! The hierarchy over the candidates that an extent holds, and the search for the highest.
 //!
-//! A binary tree of boxes in depth-first order. Its leaves are full but for the last, so the place of
-//! every node follows from the number of candidates below it, and halves can be built side by side.
-//! The search is exact: a box is skipped only if its bound lies below the best height found, and of
-//! equal heights the lowest candidate wins, in whatever order they are met.
+//! Each node holds the lids of up to eight children, which are bound at once. The search is exact: a
+//! child is skipped only if its bound lies below the best height found, and of equal heights the lowest
+//! candidate wins, in whatever order they are met.
 
-use crate::bound::{Patch, facet_bound};
-use crate::contact::{Pose, touch_facet, touch_point};
+use std::ops::Range;
+
+use fearless_simd::{Simd, f32x8, prelude::*};
+use rayon::prelude::*;
+
+use crate::blocks::{Block, longest_side};
+use crate::bound::{Frame, Lids, Plane, View, lid_bounds};
+use crate::contact::Pose;
 use crate::cutter::Cutter;
+use crate::lanes::LANES;
+use crate::leaf::{Best, Leaf};
 use crate::path::Touch;
 use crate::record::Counters;
-use crate::row::{Facet, Row, facets};
 use crate::vector::{Interval, Point};
-
-/// Candidates in a leaf.
-const LEAF: usize = 4;
-
-/// Below this many candidates a node's box is turned to fit; larger ones are rarely bound to
-/// anything flat, and an upright box costs less.
-const FITTED: usize = 1024;
-
-/// Something the cutter can touch.
-pub(crate) trait Candidate: Copy + Send + Sync {
-    /// Number in the part; the tie-break.
-    fn id(&self) -> u64;
-    /// Its corners, as indices into the points.
-    fn corners(&self) -> &[u32];
-    /// Where the cutter touches it; also `None` if that is plainly below `floor`.
-    fn touch(&self, points: &[Point], cutter: &Cutter, pose: &Pose, floor: f64) -> Option<Touch>;
-}
-
-/// A point of a row.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PointCandidate {
-    id: u64,
-    point: [u32; 1],
-}
-
-impl Candidate for PointCandidate {
-    fn id(&self) -> u64 {
-        self.id
-    }
-    fn corners(&self) -> &[u32] {
-        &self.point
-    }
-    #[inline(always)]
-    fn touch(&self, points: &[Point], cutter: &Cutter, pose: &Pose, _: f64) -> Option<Touch> {
-        touch_point(cutter, pose, points[self.point[0] as usize])
-    }
-}
-
-/// A facet between two rows, or of a slab.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct FacetCandidate {
-    id: u64,
-    corners: [u32; 3],
-}
-
-impl Candidate for FacetCandidate {
-    fn id(&self) -> u64 {
-        self.id
-    }
-    fn corners(&self) -> &[u32] {
-        &self.corners
-    }
-    #[inline(always)]
-    fn touch(&self, points: &[Point], cutter: &Cutter, pose: &Pose, floor: f64) -> Option<Touch> {
-        let corners = self.corners.map(|c| points[c as usize]);
-        // Solving a facet costs several times what bounding it does.
-        if floor > f64::NEG_INFINITY && facet_bound(cutter, pose, corners).is_none_or(|b| b < floor)
-        {
-            return None;
-        }
-        touch_facet(cutter, pose, corners)
-    }
-}
-
-/// All points of the rows.
-pub(crate) fn point_candidates(rows: &[Row]) -> (Vec<Point>, Vec<PointCandidate>) {
-    let points: Vec<Point> = rows.iter().flat_map(|r| r.points.iter().copied()).collect();
-    let ids = rows
-        .iter()
-        .flat_map(|r| (0..r.points.len()).map(|i| number(r, i)));
-    let candidates = ids
-        .zip(0u32..)
-        .map(|(id, i)| PointCandidate { id, point: [i] });
-    let candidates = candidates.collect();
-    (points, candidates)
-}
-
-/// All facets of the rows, which are in order of their ids.
-pub(crate) fn facet_candidates(rows: &[Row]) -> (Vec<Point>, Vec<FacetCandidate>) {
-    let points = rows.iter().flat_map(|r| r.points.iter().copied()).collect();
-    let candidate = |f: Facet| FacetCandidate {
-        id: number(&rows[f.row], f.number),
-        corners: f.corners,
-    };
-    (points, facets(rows).map(candidate).collect())
-}
-
-/// The number of a row's `i`-th candidate in the part.
-fn number(row: &Row, i: usize) -> u64 {
-    u64::from(row.id) << 32 | i as u64
-}
-
-/// The highest candidate found so far.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Winner {
-    pub touch: Touch,
-    id: u64,
-    /// Place in the tree: a hint for the next position.
-    pub place: u32,
-}
 
 /// The hierarchy.
 #[derive(Debug)]
-pub(crate) struct Tree<C> {
+pub(crate) struct Tree<L> {
+    frame: Frame,
+    nodes: Vec<Node>,
+    leaves: Vec<L>,
+    /// What the leaves' corners are places among.
     points: Vec<Point>,
-    candidates: Vec<C>,
-    patches: Vec<Patch>,
 }
 
-impl<C: Candidate> Tree<C> {
+/// Up to eight children.
+#[derive(Debug, Clone)]
+struct Node {
+    lids: Lids,
+    /// A leaf, or a node if [`INNER`] is added.
+    children: [u32; LANES],
+}
+
+/// Tells a node from a leaf.
+const INNER: u32 = 1 << 31;
+
+/// Leaves below which a subtree is built by one thread.
+const ALONE: usize = 256;
+
+impl<L: Leaf> Tree<L> {
     /// Builds the hierarchy, in parallel on the current thread pool.
-    pub fn new((points, mut candidates): (Vec<Point>, Vec<C>)) -> Self {
-        let mut patches = vec![Patch::EMPTY; nodes(candidates.len())];
-        if !candidates.is_empty() {
-            build(&points, &mut candidates, &mut patches);
+    pub fn new(
+        points: Vec<Point>,
+        mut blocks: Vec<Block>,
+        fill: impl Fn(&[Point], &Block) -> L + Sync + Send,
+    ) -> Self {
+        arrange(&mut blocks);
+        let filled = blocks.par_iter().with_min_len(ALONE).map(|block| {
+            let leaf = fill(&points, block);
+            let vertices = leaf.vertices(&points);
+            (leaf, vertices)
+        });
+        let (leaves, vertices): (Vec<L>, Vec<Vec<Point>>) = filled.unzip();
+        let outline = Outline::new(&vertices);
+        let frame = outline.frame();
+        let empty = Node {
+            lids: Lids::EMPTY,
+            children: [0; LANES],
+        };
+        let mut nodes = vec![empty; nodes(leaves.len())];
+        if !leaves.is_empty() {
+            build(&frame, &outline, 0..leaves.len(), &mut nodes, 0);
         }
         Self {
+            frame,
+            nodes,
+            leaves,
             points,
-            candidates,
-            patches,
         }
     }
 
-    /// Raises `best` to candidate number `place` of the tree if that is higher.
-    #[inline]
-    pub fn try_place(&self, place: u32, cutter: &Cutter, pose: &Pose, best: &mut Option<Winner>) {
-        let floor = best.as_ref().map_or(f64::NEG_INFINITY, |b| b.touch.height);
-        self.raise(place, cutter, pose, floor, best);
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.leaves[..]) + size_of_val(&self.points[..])
     }
 
+    /// The highest of all candidates. `start` tells where to look first; it does not change the result.
     #[inline(always)]
-    fn raise(
+    pub fn search<S: Simd>(
         &self,
-        place: u32,
+        simd: S,
         cutter: &Cutter,
         pose: &Pose,
-        floor: f64,
-        best: &mut Option<Winner>,
+        start: &Start,
+        counters: &mut Counters,
+    ) -> Option<Touch> {
+        let mut best = Best::above(start.floor);
+        loop {
+            self.raise(simd, cutter, pose, start.place, &mut best, counters);
+            if best.id != Best::NOBODY || best.height == f64::NEG_INFINITY {
+                break;
+            }
+            // Rounding has put the floor above everything.
+            best.height = f64::NEG_INFINITY;
+        }
+        best.touch()
+    }
+
+    /// Raises `best` to the highest of all candidates.
+    #[inline(always)]
+    fn raise<S: Simd>(
+        &self,
+        simd: S,
+        cutter: &Cutter,
+        pose: &Pose,
+        place: [f64; 2],
+        best: &mut Best,
+        counters: &mut Counters,
     ) {
-        let candidate = &self.candidates[place as usize];
-        if let Some(touch) = candidate.touch(&self.points, cutter, pose, floor) {
-            let id = candidate.id();
-            let wins = |b: &Winner| {
-                touch.height > b.touch.height || (touch.height == b.touch.height && id < b.id)
-            };
-            if best.as_ref().is_none_or(wins) {
-                *best = Some(Winner { touch, id, place });
-            }
+        if self.nodes.is_empty() {
+            return;
         }
-    }
-
-    /// Raises `best` to the highest of all candidates, by trying every one.
-    pub fn try_all(&self, cutter: &Cutter, pose: &Pose, best: &mut Option<Winner>) -> Counters {
-        let all = self.candidates.len() as u32;
-        for place in 0..all {
-            // No floor: brute force solves every candidate, and so checks what the bounds skip.
-            self.raise(place, cutter, pose, f64::NEG_INFINITY, best);
-        }
-        Counters {
-            evaluations: u64::from(all),
-            nodes: 0,
-        }
-    }
-
-    /// Raises `best` to the highest of all candidates, by the hierarchy.
-    pub fn search(&self, cutter: &Cutter, pose: &Pose, best: &mut Option<Winner>) -> Counters {
-        let mut counters = Counters::default();
-        let mut open = Stack::EMPTY;
-        let bound = |node: u32, counters: &mut Counters| {
-            counters.nodes += 1;
-            self.patches[node as usize].bound(cutter, pose)
-        };
-        if !self.candidates.is_empty()
-            && let Some(height) = bound(0, &mut counters)
-        {
-            open.push(Open {
-                height,
-                node: 0,
-                first: 0,
-                count: self.candidates.len() as u32,
-            });
-        }
-        while let Some(Open {
-            height,
-            node,
-            first,
-            count,
-        }) = open.pop()
-        {
-            // Equal heights are still looked at: a lower number may be among them.
-            if best.as_ref().is_some_and(|b| height < b.touch.height) {
-                continue;
-            }
-            if count as usize <= LEAF {
-                for place in first..first + count {
-                    self.try_place(place, cutter, pose, best);
+        let view = View::new(&self.frame, cutter, pose);
+        let mut top = Top::new(cutter, pose, place, best.height);
+        let mut open = Stack::new();
+        open.push(f32::INFINITY, INNER);
+        // Equal heights are still looked at: a lower number may be among them.
+        while let Some(child) = open.pop(top.height) {
+            if child & INNER == 0 {
+                let before = (best.height, best.id);
+                let leaf = &self.leaves[child as usize];
+                counters.evaluations +=
+                    leaf.search(simd, &self.points, cutter, pose, &top.plane, best);
+                if before != (best.height, best.id) {
+                    let [d, _, z] = pose.face(best.contact);
+                    top = Top::new(cutter, pose, [d, z], best.height);
                 }
-                counters.evaluations += u64::from(count);
                 continue;
             }
-            let left_count = left_of(count as usize) as u32;
-            let left_node = node + 1;
-            let right_node = left_node + nodes(left_count as usize) as u32;
-            let left = bound(left_node, &mut counters).map(|height| Open {
-                height,
-                node: left_node,
-                first,
-                count: left_count,
-            });
-            let right = bound(right_node, &mut counters).map(|height| Open {
-                height,
-                node: right_node,
-                first: first + left_count,
-                count: count - left_count,
-            });
-            // The more promising one is looked at first.
-            let (lower, higher) = match (left, right) {
-                (Some(l), Some(r)) if l.height > r.height => (right, left),
-                _ => (left, right),
-            };
-            lower.into_iter().chain(higher).for_each(|o| open.push(o));
+            counters.nodes += 1;
+            let node = &self.nodes[(child ^ INNER) as usize];
+            let bounds = lid_bounds(simd, cutter, &view, top.place, &node.lids);
+            open.push_all(simd, bounds, top.height, &node.children);
         }
-        counters
     }
 }
 
-/// A node still to be looked at.
+/// What is known before a search.
 #[derive(Debug, Clone, Copy)]
-struct Open {
-    height: f64,
-    node: u32,
-    first: u32,
-    count: u32,
+pub(crate) struct Start {
+    /// A height that some candidate exceeds, mm, or minus infinity.
+    pub floor: f64,
+    /// `(d, z)` of the place on the cutter that is likely to touch.
+    pub place: [f64; 2],
 }
 
-/// The nodes still to be looked at: one for each level of the tree, of which there are at most 32.
+/// What the best candidate so far rules out.
+struct Top {
+    /// Not above its height, and never below everything.
+    height: f32,
+    /// `(d, z)` of its place on the cutter, and the tangent plane there.
+    place: [f32; 2],
+    plane: Plane,
+}
+
+impl Top {
+    #[inline(always)]
+    fn new(cutter: &Cutter, pose: &Pose, place: [f64; 2], height: f64) -> Self {
+        let low = height as f32 - height.abs() as f32 * f32::EPSILON;
+        Self {
+            height: low.max(f32::MIN),
+            place: [place[0] as f32, place[1] as f32],
+            plane: Plane::at(cutter, pose, place),
+        }
+    }
+}
+
+/// The children still to be looked at.
 struct Stack {
-    nodes: [Open; 40],
+    open: [(f32, u32); Self::SIZE],
     len: usize,
 }
 
 impl Stack {
-    const EMPTY: Self = Self {
-        nodes: [Open {
-            height: 0.0,
-            node: 0,
-            first: 0,
-            count: 0,
-        }; 40],
-        len: 0,
-    };
+    /// Seven for each level of the tree, of which there are at most eleven, and one more.
+    const SIZE: usize = 80;
 
-    fn push(&mut self, node: Open) {
-        self.nodes[self.len] = node;
+    #[inline(always)]
+    fn new() -> Self {
+        Self {
+            open: [(0.0, 0); Self::SIZE],
+            len: 0,
+        }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, bound: f32, child: u32) {
+        self.open[self.len] = (bound, child);
         self.len += 1;
     }
 
-    fn pop(&mut self) -> Option<Open> {
-        self.len = self.len.checked_sub(1)?;
-        Some(self.nodes[self.len])
+    /// Pushes the children whose bound is not below `height`, the most promising one last.
+    #[inline(always)]
+    fn push_all<S: Simd>(&mut self, _: S, bounds: f32x8<S>, height: f32, children: &[u32; LANES]) {
+        let mut high = bounds.simd_ge(height).to_bitmask();
+        let first = self.len;
+        let mut highest = first;
+        while high != 0 {
+            let lane = high.trailing_zeros() as usize;
+            high &= high - 1;
+            if self.len > first && bounds[lane] > self.open[highest].0 {
+                highest = self.len;
+            }
+            self.push(bounds[lane], children[lane]);
+        }
+        if self.len > first {
+            self.open.swap(highest, self.len - 1);
+        }
+    }
+
+    /// The next child whose bound is not below `height`.
+    #[inline(always)]
+    fn pop(&mut self, height: f32) -> Option<u32> {
+        while let Some(len) = self.len.checked_sub(1) {
+            self.len = len;
+            let (bound, child) = self.open[len];
+            if bound >= height {
+                return Some(child);
+            }
+        }
+        None
     }
 }
 
-/// Nodes of a tree over `count` candidates: its leaves are full but for the last.
-fn nodes(count: usize) -> usize {
-    (2 * count.div_ceil(LEAF)).saturating_sub(1)
+/// Leaves of each full child of a node over `leaves` leaves: the greatest power of eight below them.
+fn child_size(leaves: usize) -> usize {
+    let mut size = 1;
+    while size * LANES < leaves {
+        size *= LANES;
+    }
+    size
 }
 
-/// How many of `count > LEAF` candidates go left: as many full leaves as make a complete tree.
-fn left_of(count: usize) -> usize {
-    LEAF * (count.div_ceil(LEAF).next_power_of_two() / 2)
+/// Nodes of a tree over `leaves` leaves; all children but the last are full.
+fn nodes(leaves: usize) -> usize {
+    if leaves == 0 {
+        return 0;
+    }
+    let size = child_size(leaves);
+    if size == 1 {
+        return 1;
+    }
+    let (full, rest) = (leaves / size, leaves % size);
+    1 + full * nodes(size) + nodes(rest)
 }
 
-fn build<C: Candidate>(points: &[Point], candidates: &mut [C], patches: &mut [Patch]) {
-    let corner = |c: &u32| points[*c as usize];
-    let corners = candidates
-        .iter()
-        .flat_map(|c| c.corners().iter().map(corner));
-    let (patch, below) = patches
-        .split_first_mut()
-        .expect("a node for every candidate");
-    *patch = if candidates.len() <= FITTED {
-        Patch::around(corners)
+/// Orders blocks so that those of each node lie together.
+fn arrange(blocks: &mut [Block]) {
+    let size = child_size(blocks.len());
+    if size > 1 {
+        part(blocks, size);
+    }
+}
+
+/// Parts blocks into children of `size` blocks, halving along the longest side.
+fn part(blocks: &mut [Block], size: usize) {
+    if blocks.len() <= size {
+        return arrange(blocks);
+    }
+    let children = blocks.len().div_ceil(size);
+    let left = children / 2 * size;
+    let axis = longest_side(&blocks.iter().map(|b| b.middle));
+    let middle = |b: &Block| b.middle[axis];
+    blocks.select_nth_unstable_by(left, |a, b| middle(a).total_cmp(&middle(b)));
+    let (left, right) = blocks.split_at_mut(left);
+    if right.len() < ALONE {
+        part(left, size);
+        part(right, size);
     } else {
-        Patch::upright(corners)
-    };
-    if candidates.len() <= LEAF {
-        return;
+        rayon::join(|| part(left, size), || part(right, size));
     }
-    let left_count = left_of(candidates.len());
-    let axis = longest_axis(points, candidates);
-    let middle = |c: &C| {
-        c.corners()
-            .iter()
-            .map(|&i| points[i as usize][axis])
-            .sum::<f64>()
+}
+
+/// The vertices of all leaves, one leaf after the other.
+struct Outline {
+    points: Vec<Point>,
+    /// Where those of each leaf begin, and where the last end.
+    starts: Vec<usize>,
+}
+
+impl Outline {
+    fn new(leaves: &[Vec<Point>]) -> Self {
+        let mut starts = vec![0];
+        let mut points = Vec::with_capacity(leaves.iter().map(Vec::len).sum());
+        for vertices in leaves {
+            points.extend_from_slice(vertices);
+            starts.push(points.len());
+        }
+        Self { points, starts }
+    }
+
+    fn of(&self, leaves: Range<usize>) -> &[Point] {
+        &self.points[self.starts[leaves.start]..self.starts[leaves.end]]
+    }
+
+    fn frame(&self) -> Frame {
+        let x = Interval::of(self.points.iter().map(|p| p[0]));
+        let square = |p: &Point| p[1] * p[1] + p[2] * p[2];
+        let across = self.points.iter().map(square).fold(0.0, f64::max);
+        Frame::new(x, across.sqrt())
+    }
+}
+
+/// Fills the nodes over leaves that are in order; `offset` is the place of the first node.
+fn build(
+    frame: &Frame,
+    outline: &Outline,
+    leaves: Range<usize>,
+    nodes: &mut [Node],
+    offset: usize,
+) {
+    let size = child_size(leaves.len());
+    let Some((node, mut below)) = nodes.split_first_mut() else {
+        return;
     };
-    candidates.select_nth_unstable_by(left_count, |a, b| middle(a).total_cmp(&middle(b)));
-    let (left, right) = candidates.split_at_mut(left_count);
-    let (left_patches, right_patches) = below.split_at_mut(nodes(left_count));
-    if right.len() < FITTED {
-        build(points, left, left_patches);
-        build(points, right, right_patches);
+    let mut tasks = Vec::with_capacity(LANES);
+    let mut at = offset + 1;
+    for (lane, start) in leaves.clone().step_by(size).enumerate() {
+        let child = start..leaves.end.min(start + size);
+        node.children[lane] = start as u32;
+        if size > 1 {
+            node.children[lane] = INNER | at as u32;
+            let (own, rest) = below.split_at_mut(self::nodes(child.len()));
+            at += own.len();
+            below = rest;
+            tasks.push((child, own, at - self::nodes(size.min(leaves.end - start))));
+        }
+    }
+    let fill = |node: &mut Node| {
+        for (lane, start) in leaves.clone().step_by(size).enumerate() {
+            let child = start..leaves.end.min(start + size);
+            node.lids.set(lane, frame, outline.of(child));
+        }
+    };
+    if leaves.len() < ALONE {
+        fill(node);
+        for (child, nodes, offset) in tasks {
+            build(frame, outline, child, nodes, offset);
+        }
     } else {
         rayon::join(
-            || build(points, left, left_patches),
-            || build(points, right, right_patches),
+            || fill(node),
+            || {
+                let tasks = tasks.into_par_iter();
+                tasks.for_each(|(child, nodes, offset)| {
+                    build(frame, outline, child, nodes, offset);
+                });
+            },
         );
     }
-}
-
-/// The axis along which the candidates' first corners extend most.
-fn longest_axis<C: Candidate>(points: &[Point], candidates: &[C]) -> usize {
-    let extent = |axis: usize| {
-        let along = candidates
-            .iter()
-            .map(|c| points[c.corners()[0] as usize][axis]);
-        let range = Interval::of(along);
-        range.high - range.low
-    };
-    let extents = [extent(0), extent(1), extent(2)];
-    (0..3).fold(0, |a, b| if extents[b] > extents[a] { b } else { a })
 }

@@ -10,6 +10,7 @@ mod service;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::time::Duration;
 
+use horma_core::Simd;
 use horma_proto::MAX_MESSAGE;
 use horma_proto::wire::worker_server::WorkerServer;
 use tokio::net::TcpListener;
@@ -34,6 +35,8 @@ pub struct Config {
     pub advertise: Option<String>,
     /// Threads to digitize with.
     pub threads: usize,
+    /// Instruction set to digitize with.
+    pub simd: Simd,
     /// How long to look for the master, at first and again when it has gone.
     pub patience: Duration,
 }
@@ -57,7 +60,7 @@ pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationTo
         .num_threads(config.threads)
         .build()
         .map_err(Error::Threads)?;
-    let service = service::Service::new(pool, shutdown.clone());
+    let service = service::Service::new(pool, config.simd, shutdown.clone());
     let service = WorkerServer::new(service)
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);

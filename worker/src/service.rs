@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use horma_core::{Counters, Digitizer, Job, Row, Trajectory};
+use horma_core::{Counters, Digitizer, Job, Row, Simd, Trajectory};
 use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::digitize_request::Kind as Request;
 use horma_proto::wire::worker_server::Worker;
@@ -21,13 +21,18 @@ const WAITING_CHUNKS: usize = 4;
 
 pub(crate) struct Service {
     pool: Arc<ThreadPool>,
+    simd: Simd,
     shutdown: CancellationToken,
 }
 
 impl Service {
-    pub fn new(pool: ThreadPool, shutdown: CancellationToken) -> Self {
+    pub fn new(pool: ThreadPool, simd: Simd, shutdown: CancellationToken) -> Self {
         let pool = Arc::new(pool);
-        Self { pool, shutdown }
+        Self {
+            pool,
+            simd,
+            shutdown,
+        }
     }
 }
 
@@ -42,9 +47,9 @@ impl Worker for Service {
         let task = receive(request.into_inner()).await?;
         info!(id = %task.id, first = task.first, count = task.count, rows = task.rows.len(), "task");
         let (replies, stream) = mpsc::channel(WAITING_CHUNKS);
-        let (pool, shutdown) = (self.pool.clone(), self.shutdown.clone());
+        let (pool, simd, shutdown) = (self.pool.clone(), self.simd, self.shutdown.clone());
         tokio::task::spawn_blocking(move || {
-            pool.install(|| digitize(&task, &replies, &shutdown));
+            pool.install(|| digitize(&task, simd, &replies, &shutdown));
         });
         Ok(Response::new(ReceiverStream::new(stream)))
     }
@@ -136,6 +141,7 @@ fn header_from_wire(header: wire::Task) -> horma_proto::Result<Task> {
 /// when the master no longer listens.
 fn digitize(
     task: &Task,
+    simd: Simd,
     replies: &mpsc::Sender<Result<DigitizeReply, Status>>,
     shutdown: &CancellationToken,
 ) {
@@ -147,7 +153,7 @@ fn digitize(
             .is_ok()
     };
     let begin = Instant::now();
-    let digitizer = Digitizer::new(&task.job, &task.rows);
+    let digitizer = Digitizer::new(&task.job, &task.rows, simd);
     let build_seconds = begin.elapsed().as_secs_f64();
     let begin = Instant::now();
     let positions = task.first..task.first + task.count;

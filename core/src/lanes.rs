@@ -1,0 +1,150 @@
+//! Contact with points, eight at a time.
+//!
+//! The same sequence of + − × ÷ √ as [`crate::contact::touch_point`], lane by lane, so that the heights
+//! are the same bits. Nothing is multiplied and added in one step, and nothing depends on the other
+//! lanes.
+
+use fearless_simd::{Simd, f32x8, f64x8, mask64x8, prelude::*};
+
+use crate::contact::Pose;
+use crate::cutter::Cutter;
+
+/// Lanes of a vector.
+pub(crate) const LANES: usize = 8;
+
+/// m(d) of eight distances, and which of them are within the width.
+#[inline(always)]
+fn radii<S: Simd>(simd: S, cutter: &Cutter, d: f64x8<S>) -> (f64x8<S>, mask64x8<S>) {
+    match *cutter {
+        Cutter::Torus {
+            major_radius,
+            minor_radius,
+        } => {
+            let q = f64x8::splat(simd, minor_radius * minor_radius) - d * d;
+            (q.sqrt() + major_radius, q.simd_ge(0.0))
+        }
+        Cutter::Cone {
+            radius,
+            width,
+            slope,
+            ..
+        } => (d * slope + radius, d.abs().simd_le(width / 2.0)),
+    }
+}
+
+/// About m(d), well within the width, a root, and the slope of m times that root.
+#[inline(always)]
+pub(crate) fn slopes<S: Simd>(
+    simd: S,
+    cutter: &Cutter,
+    d: f32x8<S>,
+) -> (f32x8<S>, f32x8<S>, f32x8<S>) {
+    match *cutter {
+        Cutter::Torus {
+            major_radius,
+            minor_radius,
+        } => {
+            let r = f32x8::splat(simd, minor_radius as f32);
+            let root = ((r - d) * (r + d)).sqrt();
+            (root + major_radius as f32, root, -d)
+        }
+        Cutter::Cone { radius, slope, .. } => {
+            let slope = slope as f32;
+            let m = d * slope + radius as f32;
+            (m, f32x8::splat(simd, 1.0), f32x8::splat(simd, slope))
+        }
+    }
+}
+
+/// About `(d, z)` of the places where the cutter first meets planes of these normals, which need not be of
+/// length 1, but must point towards it.
+#[inline(always)]
+pub(crate) fn supports<S: Simd>(
+    simd: S,
+    cutter: &Cutter,
+    [x, y, z]: [f32x8<S>; 3],
+) -> (f32x8<S>, f32x8<S>) {
+    let across = y * y + z * z;
+    match *cutter {
+        Cutter::Torus {
+            major_radius,
+            minor_radius,
+        } => {
+            let share = f32x8::splat(simd, minor_radius as f32) / (x * x + across).sqrt();
+            let disc = f32x8::splat(simd, major_radius as f32) / across.sqrt();
+            (-(share * x), -((share + disc) * z))
+        }
+        Cutter::Cone {
+            radius,
+            width,
+            slope,
+            ..
+        } => {
+            // At one rim or the other.
+            let across = across.sqrt();
+            let rim = f32x8::splat(simd, (width / 2.0) as f32);
+            let d = (across * slope as f32 - x).simd_gt(0.0).select(rim, -rim);
+            (d, -((d * slope as f32 + radius as f32) * z / across))
+        }
+    }
+}
+
+/// Heights at which the cutter touches eight points; minus infinity out of reach.
+#[inline(always)]
+pub(crate) fn heights<S: Simd>(
+    simd: S,
+    cutter: &Cutter,
+    pose: &Pose,
+    [x, y, z]: [f64x8<S>; 3],
+) -> f64x8<S> {
+    let d = x - pose.x;
+    let across = y * pose.sin + z * pose.cos;
+    let (m, within) = radii(simd, cutter, d);
+    let rise = ((m - across) * (m + across)).sqrt();
+    let height = (y * pose.cos - z * pose.sin) + rise;
+    let reached = within & across.abs().simd_le(m);
+    reached.select(height, f64x8::splat(simd, f64::NEG_INFINITY))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::touch_point;
+    use crate::simd::{Simd as Level, with_simd};
+    use crate::vector::Point;
+    use proptest::prelude::*;
+
+    #[inline(always)]
+    fn eight<S: Simd>(simd: S, cutter: &Cutter, pose: &Pose, points: &[Point; 8]) -> [f64; 8] {
+        let axis = |k: usize| f64x8::from_fn(simd, |i| points[i][k]);
+        *heights(simd, cutter, pose, [axis(0), axis(1), axis(2)])
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        #[test]
+        fn eight_heights_are_the_bits_of_one_each(
+            points in prop::array::uniform8(prop::array::uniform3(-60.0..60.0_f64)),
+            x in -40.0..40.0_f64,
+            degrees in 0..360_i32,
+            which in 0..4_usize,
+        ) {
+            let cutter = [
+                Cutter::torus(40.0, 8.0),
+                Cutter::ball(15.0),
+                Cutter::cylinder(30.0, 36.0),
+                Cutter::cone(10.0, 20.0, 45.0),
+            ][which].clone().expect("valid");
+            let angle = f64::from(degrees).to_radians();
+            let pose = Pose { x, cos: libm::cos(angle), sin: libm::sin(angle) };
+            for level in Level::available() {
+                let all = with_simd!(level, simd => eight(simd, &cutter, &pose, &points));
+                for (p, height) in points.iter().zip(all) {
+                    let one = touch_point(&cutter, &pose, *p).map_or(f64::NEG_INFINITY, |t| t.height);
+                    prop_assert_eq!(one.to_bits(), height.to_bits());
+                }
+            }
+        }
+    }
+}

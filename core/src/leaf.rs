@@ -1,0 +1,281 @@
+//! Leaves of the hierarchy: a few candidates that lie together, laid out for vectors.
+//!
+//! A leaf is solved exactly. A grid's is a block of four by four points or cells, a mesh's a handful of
+//! triangles that share vertices. A candidate carries its number in the part, which breaks ties.
+
+use fearless_simd::{Simd, f64x8, prelude::*};
+
+use crate::bound::{Near, Plane, facet_bounds, load};
+use crate::contact::{Pose, touch_seen};
+use crate::cutter::Cutter;
+use crate::lanes::{LANES, heights};
+use crate::path::Touch;
+use crate::vector::{Interval, Point};
+
+/// The highest candidate found so far.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Best {
+    /// Its height, mm; before there is one, a height that some candidate exceeds, or minus infinity.
+    pub height: f64,
+    /// Its number in the part; [`Best::NOBODY`] before there is one.
+    pub id: u64,
+    /// Where it is touched.
+    pub contact: Point,
+}
+
+impl Best {
+    /// The number of no candidate.
+    pub const NOBODY: u64 = u64::MAX;
+
+    /// Nothing found yet, but known to be above `floor`.
+    #[inline(always)]
+    pub fn above(floor: f64) -> Self {
+        Self {
+            height: floor,
+            id: Self::NOBODY,
+            contact: [0.0; 3],
+        }
+    }
+
+    /// Takes a candidate's touch if it is higher, or as high and first in number.
+    #[inline(always)]
+    pub fn raise(&mut self, touch: Touch, id: u64) {
+        if touch.height > self.height || (touch.height == self.height && id < self.id) {
+            *self = Self {
+                height: touch.height,
+                id,
+                contact: touch.contact,
+            };
+        }
+    }
+
+    /// The touch, if there was any.
+    #[inline(always)]
+    pub fn touch(&self) -> Option<Touch> {
+        (self.id != Self::NOBODY).then_some(Touch {
+            height: self.height,
+            contact: self.contact,
+        })
+    }
+}
+
+/// A few candidates.
+pub(crate) trait Leaf: Sync + Send {
+    /// Its vertices.
+    fn vertices(&self, points: &[Point]) -> Vec<Point>;
+
+    /// Raises `best` to the highest candidate; `ceiling` is a plane that F does not exceed. Returns how
+    /// many candidates were evaluated.
+    fn search<S: Simd>(
+        &self,
+        simd: S,
+        points: &[Point],
+        cutter: &Cutter,
+        pose: &Pose,
+        ceiling: &Plane,
+        best: &mut Best,
+    ) -> u64;
+}
+
+/// Points in a leaf.
+pub(crate) const POINTS: usize = 16;
+
+/// A block of points, its free slots out of any reach.
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+pub(crate) struct PointLeaf {
+    at: [[f64; POINTS]; 3],
+    ids: [u64; POINTS],
+    count: usize,
+}
+
+impl PointLeaf {
+    /// Of at most [`POINTS`] numbered points.
+    pub fn new(points: impl Iterator<Item = (u64, Point)>) -> Self {
+        let mut leaf = Self {
+            at: [[f64::INFINITY; POINTS], [0.0; POINTS], [0.0; POINTS]],
+            ids: [u64::MAX; POINTS],
+            count: 0,
+        };
+        for (id, point) in points {
+            let slot = leaf.count;
+            for (axis, coordinate) in leaf.at.iter_mut().zip(point) {
+                axis[slot] = coordinate;
+            }
+            leaf.ids[slot] = id;
+            leaf.count += 1;
+        }
+        leaf
+    }
+
+    #[inline(always)]
+    fn point(&self, slot: usize) -> Point {
+        [self.at[0][slot], self.at[1][slot], self.at[2][slot]]
+    }
+}
+
+impl Leaf for PointLeaf {
+    fn vertices(&self, _: &[Point]) -> Vec<Point> {
+        (0..self.count).map(|slot| self.point(slot)).collect()
+    }
+
+    #[inline(always)]
+    fn search<S: Simd>(
+        &self,
+        simd: S,
+        _: &[Point],
+        cutter: &Cutter,
+        pose: &Pose,
+        _: &Plane,
+        best: &mut Best,
+    ) -> u64 {
+        for first in (0..POINTS).step_by(LANES) {
+            let eight = [
+                f64x8::from_slice(simd, &self.at[0][first..first + LANES]),
+                f64x8::from_slice(simd, &self.at[1][first..first + LANES]),
+                f64x8::from_slice(simd, &self.at[2][first..first + LANES]),
+            ];
+            let all = heights(simd, cutter, pose, eight);
+            let mut high = all.simd_ge(best.height.max(f64::MIN)).to_bitmask();
+            while high != 0 {
+                let lane = high.trailing_zeros() as usize;
+                high &= high - 1;
+                let slot = first + lane;
+                let touch = Touch {
+                    height: all[lane],
+                    contact: self.point(slot),
+                };
+                best.raise(touch, self.ids[slot]);
+            }
+        }
+        self.count as u64
+    }
+}
+
+/// Facets in a leaf: those of two by two cells.
+pub(crate) const FACETS: usize = LANES;
+
+/// Facets that lie together.
+#[derive(Debug, Clone)]
+#[repr(align(32))]
+pub(crate) struct FacetLeaf {
+    /// The corners of each facet from the middle on, in single precision: what the bounds need. Free
+    /// slots repeat the first facet.
+    near: [[[f32; FACETS]; 3]; 3],
+    middle: Point,
+    /// Largest distance of a corner from the middle, along any axis, mm.
+    size: f32,
+    count: u32,
+    /// The corners as places among all points: what is solved exactly.
+    corners: [[u32; 3]; FACETS],
+    ids: [u64; FACETS],
+}
+
+impl FacetLeaf {
+    /// Of one to [`FACETS`] numbered facets.
+    pub fn new(points: &[Point], facets: impl Iterator<Item = ([u32; 3], u64)>) -> Self {
+        let mut leaf = Self {
+            near: [[[0.0; FACETS]; 3]; 3],
+            middle: [0.0; 3],
+            size: 0.0,
+            count: 0,
+            corners: [[0; 3]; FACETS],
+            ids: [Best::NOBODY; FACETS],
+        };
+        for (corners, id) in facets {
+            leaf.corners[leaf.count as usize] = corners;
+            leaf.ids[leaf.count as usize] = id;
+            leaf.count += 1;
+        }
+        let used = leaf.corners[..leaf.count as usize].as_flattened();
+        let ranges = [0, 1, 2].map(|k| Interval::of(used.iter().map(|&c| points[c as usize][k])));
+        leaf.middle = ranges.map(|r| (r.low + r.high) / 2.0);
+        for k in 0..3 {
+            leaf.size = leaf.size.max((ranges[k].high - leaf.middle[k]) as f32);
+            for slot in 0..FACETS {
+                let used = if slot < leaf.count as usize { slot } else { 0 };
+                for c in 0..3 {
+                    let point = points[leaf.corners[used][c] as usize];
+                    leaf.near[c][k][slot] = (point[k] - leaf.middle[k]) as f32;
+                }
+            }
+        }
+        leaf
+    }
+
+    /// Raises `best` to the facet in a slot.
+    #[inline(never)]
+    fn solve(&self, points: &[Point], cutter: &Cutter, pose: &Pose, slot: usize, best: &mut Best) {
+        let [a, b, c] = self.corners[slot];
+        let corners = [points[a as usize], points[b as usize], points[c as usize]];
+        let seen = [
+            pose.face(corners[0]),
+            pose.face(corners[1]),
+            pose.face(corners[2]),
+        ];
+        if let Some(touch) = touch_seen(cutter, corners, seen, best.height) {
+            best.raise(touch, self.ids[slot]);
+        }
+    }
+}
+
+impl Leaf for FacetLeaf {
+    fn vertices(&self, points: &[Point]) -> Vec<Point> {
+        let mut corners = [0; 3 * FACETS];
+        let used = 3 * self.count as usize;
+        corners[..used].copy_from_slice(self.corners[..self.count as usize].as_flattened());
+        let corners = &mut corners[..used];
+        corners.sort_unstable();
+        let distinct = corners.chunk_by(|a, b| a == b);
+        distinct.map(|c| points[c[0] as usize]).collect()
+    }
+
+    #[inline(always)]
+    fn search<S: Simd>(
+        &self,
+        simd: S,
+        points: &[Point],
+        cutter: &Cutter,
+        pose: &Pose,
+        ceiling: &Plane,
+        best: &mut Best,
+    ) -> u64 {
+        // Heights are counted from the best one, so that single precision tells close ones apart.
+        let base = best.height.max(-1.0e9);
+        let [d, y, z] = pose.face(self.middle);
+        let near = Near::new(cutter, pose, [d, y - base, z], self.size);
+        let roof = near.roof(ceiling, pose, self.middle, base);
+        let corners = [
+            load(simd, &self.near[0]),
+            load(simd, &self.near[1]),
+            load(simd, &self.near[2]),
+        ];
+        let used = (1u64 << self.count) - 1;
+        let under = roof.above(simd, corners);
+        let alive = under.simd_ge(0.0).to_bitmask() & used;
+        if alive == 0 {
+            return 0;
+        }
+        let bounds = facet_bounds(simd, cutter, &near, corners).min(under);
+        let mut high = bounds.simd_ge(0.0).to_bitmask() & used;
+        // The most promising one is solved first; it may rule out the others.
+        while high != 0 {
+            let mut highest = (f32::NEG_INFINITY, 0);
+            let mut rest = high;
+            while rest != 0 {
+                let slot = rest.trailing_zeros() as usize;
+                rest &= rest - 1;
+                if bounds[slot] > highest.0 {
+                    highest = (bounds[slot], slot);
+                }
+            }
+            let (bound, slot) = highest;
+            if f64::from(bound) < best.height - base {
+                break;
+            }
+            high &= !(1 << slot);
+            self.solve(points, cutter, pose, slot, best);
+        }
+        u64::from(alive.count_ones())
+    }
+}
