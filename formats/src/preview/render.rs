@@ -67,7 +67,7 @@ fn encode(picture: &[u8]) -> Result<Vec<u8>, png::EncodingError> {
     let mut file = Vec::with_capacity(picture.len() / 2);
     let mut encoder = png::Encoder::new(&mut file, SIZE.0, SIZE.1);
     encoder.set_color(png::ColorType::Rgb);
-    // A tenth of the time for half as many bytes again: the picture is not worth waiting for.
+    // Quick rather than small: nobody should wait for the picture.
     encoder.set_compression(png::Compression::Fast);
     encoder.set_filter(png::Filter::Up);
     let mut writer = encoder.write_header()?;

@@ -3,7 +3,9 @@
 //! A picture needs no chordal tolerance: cells of some pixels, shaded smoothly, look like the
 //! surface and cost a fraction of finding a grid that is proven fine enough.
 
-use horma_core::{Direction, Mesh, Part, Point, Shape, Surface, cross, length, sub, unit};
+use horma_core::{
+    Direction, Interval, Mesh, Part, Point, Shape, Surface, cross, length, sub, unit,
+};
 
 /// Triangles with vertices in common.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -17,7 +19,7 @@ pub struct Sheet {
 }
 
 /// Cells along the longest side of the part: each is some pixels of [`super::SIZE`].
-const CELLS: f64 = 150.0;
+const CELLS: f64 = 120.0;
 
 /// Most cells along one direction of one surface.
 const MAX_CELLS: f64 = 1200.0;
@@ -26,7 +28,7 @@ const MAX_CELLS: f64 = 1200.0;
 pub(super) fn sheets(part: &Part) -> Vec<Sheet> {
     let points = || part.bodies.iter().flat_map(|body| outline(&body.shape));
     let side = |k: usize| {
-        let x = horma_core::Interval::of(points().map(|p| p[k]));
+        let x = Interval::of(points().map(|p| p[k]));
         x.high - x.low
     };
     let cell = (0..3).map(side).fold(0.0, f64::max) / CELLS;
@@ -156,7 +158,7 @@ mod tests {
             assert!(has([-half, 0.0, half]) && has([half, 3.0, half]));
             assert!(has([0.0; 3]) || pieces == 4000);
             let rows = sheet.points.iter().filter(|p| p[1] == 0.0).count();
-            assert!((100..=300).contains(&rows), "{rows}");
+            assert!((80..=240).contains(&rows), "{rows}");
             assert_eq!(sheet.normals.len(), sheet.points.len());
             let steep = sheet.normals[0][2].abs();
             assert!((steep - 0.5_f64.sqrt()).abs() < 1e-9);
