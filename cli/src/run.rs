@@ -1,7 +1,9 @@
 //! `run` and `submit`: from a job file to its results. They differ only in who computes.
 
+use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::Arc;
+use std::thread;
 use std::time::Instant;
 
 use horma_core::{Part, Phase, Simd, ToolPath, place};
@@ -123,17 +125,21 @@ fn write(
         ("job", &*args.file.to_string_lossy()),
         ("cutter", &described(&report.job["cutter"])),
     ];
-    gcode::save(&staging.file(output::PROGRAM), path, file.program, &heading)?;
-    going_on()?;
-    csv::save(&staging.file(output::PATH), path)?;
+    // The picture takes about as long as the rest.
+    let drawn = thread::scope(|scope| {
+        let drawing = scope.spawn(|| preview::save(&staging.file(output::PREVIEW), part, path));
+        gcode::save(&staging.file(output::PROGRAM), path, file.program, &heading)?;
+        going_on()?;
+        csv::save(&staging.file(output::PATH), path)?;
+        Ok::<_, Error>(drawing.join().unwrap_or_else(|panic| resume_unwind(panic)))
+    })?;
     going_on()?;
     // Nobody turns a picture: a path without one is as good.
-    if let Err(error) = preview::save(&staging.file(output::PREVIEW), part, path) {
+    if let Err(error) = drawn {
         let warning = format!("there is no picture: {error}");
         display.note(&format!("warning: {warning}"));
         report.warnings.push(warning);
     }
-    going_on()?;
     report.record.phases.push(phase("write", begin));
     report::save(&staging.file(output::REPORT), &report)?;
     staging.publish()?;

@@ -3,12 +3,12 @@
 //! Two runs of the same job give the same bytes, so the file is compared with `cmp`. It does not
 //! describe the job; that is the report's.
 
-use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::Path;
 
 use horma_core::{ToolPath, Touch};
 
+use crate::decimal::integer;
 use crate::error::{Error, Result};
 use crate::output;
 
@@ -44,14 +44,13 @@ pub fn save(file: &Path, path: &ToolPath) -> Result<()> {
 /// # Errors
 /// Those of `out`.
 pub fn write(path: &ToolPath, out: &mut impl Write) -> io::Result<()> {
-    let mut text = String::with_capacity(CHUNK + 256);
-    text.push_str(HEADER);
-    text.push('\n');
+    let mut text = Vec::with_capacity(CHUNK + 256);
+    text.extend_from_slice(HEADER.as_bytes());
+    text.push(b'\n');
     for (index, touch) in (0u64..).zip(&path.touches) {
         let x = path.trajectory.travel(index);
         let angle = path.trajectory.angle(index);
-        // Formatting into a string cannot fail.
-        let _ = write!(text, "{index}");
+        integer(&mut text, index);
         number(&mut text, x);
         number(&mut text, angle);
         match touch {
@@ -59,30 +58,42 @@ pub fn write(path: &ToolPath, out: &mut impl Write) -> io::Result<()> {
                 number(&mut text, *height);
                 contact.iter().for_each(|&c| number(&mut text, c));
             }
-            None => text.push_str(",,,,"),
+            None => text.extend_from_slice(b",,,,"),
         }
-        text.push('\n');
+        text.push(b'\n');
         if text.len() >= CHUNK {
-            out.write_all(text.as_bytes())?;
+            out.write_all(&text)?;
             text.clear();
         }
     }
-    out.write_all(text.as_bytes())
+    out.write_all(&text)
 }
 
 /// A comma and the shortest text that reads back to `value`, without exponent or negative zero.
-fn number(text: &mut String, value: f64) {
-    text.push(',');
+fn number(text: &mut Vec<u8>, value: f64) {
+    text.push(b',');
     let value = value + 0.0;
-    let mut buffer = zmij::Buffer::new();
-    let digits = buffer.format_finite(value);
-    if digits.contains('e') {
-        // Very large or very small. The same digits, only slower.
-        let _ = write!(text, "{value}");
+    let size = value.abs();
+    let whole = size as u64;
+    if size < LARGE && whole as f64 == size {
+        if value < 0.0 {
+            text.push(b'-');
+        }
+        integer(text, whole);
+    } else if (SMALL..LARGE).contains(&size) {
+        let mut buffer = zmij::Buffer::new();
+        text.extend_from_slice(buffer.format_finite(value).as_bytes());
     } else {
-        text.push_str(digits.strip_suffix(".0").unwrap_or(digits));
+        // The same digits, only slower. Writing into memory cannot fail.
+        let _ = write!(text, "{value}");
     }
 }
+
+/// From here to [`LARGE`] zmij writes no exponent.
+const SMALL: f64 = 1.0e-4;
+/// 2⁵³: whole numbers below it have no shorter text than their digits, and above it none has a
+/// fraction.
+const LARGE: f64 = 9_007_199_254_740_992.0;
 
 /// Reads a file that [`save`] wrote.
 ///
@@ -198,10 +209,12 @@ index,x,angle,y,contact_x,contact_y,contact_z
         let mut bits = 1u64;
         for _ in 0..10_000 {
             bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            for value in [f64::from_bits(bits), bits as f64 * 1e-17] {
+            let near = (bits >> 44) as f64 - 5e5;
+            for value in [f64::from_bits(bits), bits as f64 * 1e-17, near, near / 1e3] {
                 if value.is_finite() {
-                    let mut text = String::new();
+                    let mut text = Vec::new();
                     number(&mut text, value);
+                    let text = String::from_utf8(text).expect("ASCII");
                     assert_eq!(text[1..].parse(), Ok(value));
                     assert_eq!(text.len(), format!(",{value}").len());
                 }

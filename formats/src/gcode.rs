@@ -5,12 +5,12 @@
 //! The program starts no spindle and changes no tool: nothing is known of either. Limits of travel,
 //! speed and acceleration are the machine's own.
 
-use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::Path;
 
 use horma_core::{ToolPath, Touch};
 
+use crate::decimal::fixed;
 use crate::error::{Error, Result};
 use crate::job::Program;
 use crate::output;
@@ -100,11 +100,11 @@ fn write(
     heading: &Heading,
     out: &mut impl Write,
 ) -> io::Result<()> {
-    let mut text = String::with_capacity(CHUNK + 1024);
+    let mut text = Vec::with_capacity(CHUNK + 1024);
     let highest = stations.iter().map(|s| s.height).fold(f64::MIN, f64::max);
     let safe = highest + program.clearance;
 
-    text.push_str("%\n");
+    text.extend_from_slice(b"%\n");
     for (label, value) in heading {
         comment(&mut text, &format!("{label}: {value}"));
     }
@@ -112,8 +112,8 @@ fn write(
         comment(&mut text, note);
     }
     line(&mut text, MODES, &[]);
-    line(&mut text, "G64", &[('P', BLEND)]);
-    line(&mut text, "G0", &[('Y', safe)]);
+    line(&mut text, "G64", &[(b'P', BLEND)]);
+    line(&mut text, "G0", &[(b'Y', safe)]);
 
     let mut last = None;
     for (index, station) in (0u64..).zip(stations) {
@@ -121,32 +121,32 @@ fn write(
         let angle = path.trajectory.angle(index);
         match last {
             None => {
-                line(&mut text, "G0", &[('X', x), ('A', angle)]);
-                text.push_str("G1");
-                word(&mut text, 'Y', station.height, DECIMALS);
+                line(&mut text, "G0", &[(b'X', x), (b'A', angle)]);
+                text.extend_from_slice(b"G1");
+                word(&mut text, b'Y', station.height, DECIMALS);
                 feed_word(&mut text, program.feed);
-                text.push_str("G93\n");
+                text.extend_from_slice(b"G93\n");
             }
             Some((from_x, from_angle, from)) => {
                 let length = cut(x - from_x, angle - from_angle, from, station);
-                text.push_str("G1");
-                word(&mut text, 'X', x, DECIMALS);
-                word(&mut text, 'Y', station.height, DECIMALS);
-                word(&mut text, 'A', angle, DECIMALS);
+                text.extend_from_slice(b"G1");
+                word(&mut text, b'X', x, DECIMALS);
+                word(&mut text, b'Y', station.height, DECIMALS);
+                word(&mut text, b'A', angle, DECIMALS);
                 feed_word(&mut text, program.feed / length.max(SHORTEST));
             }
         }
         last = Some((x, angle, station));
         if text.len() >= CHUNK {
-            out.write_all(text.as_bytes())?;
+            out.write_all(&text)?;
             text.clear();
         }
     }
 
-    text.push_str("G94\n");
-    line(&mut text, "G0", &[('Y', safe)]);
-    text.push_str("M2\n%\n");
-    out.write_all(text.as_bytes())
+    text.extend_from_slice(b"G94\n");
+    line(&mut text, "G0", &[(b'Y', safe)]);
+    text.extend_from_slice(b"M2\n%\n");
+    out.write_all(&text)
 }
 
 /// Length of the cutter's way over the part, mm: travel, attack, and the arc at the contact.
@@ -157,28 +157,28 @@ fn cut(dx: f64, degrees: f64, from: &Station, to: &Station) -> f64 {
 }
 
 /// A comment of printable ASCII without parentheses, which would end it.
-fn comment(text: &mut String, content: &str) {
-    text.push('(');
+fn comment(text: &mut Vec<u8>, content: &str) {
+    text.push(b'(');
     text.extend(content.chars().take(COMMENT).map(|c| match c {
-        '(' => '[',
-        ')' => ']',
-        ' '..='~' => c,
-        _ => '?',
+        '(' => b'[',
+        ')' => b']',
+        ' '..='~' => c as u8,
+        _ => b'?',
     }));
-    text.push_str(")\n");
+    text.extend_from_slice(b")\n");
 }
 
 /// A line of a command and its words.
-fn line(text: &mut String, command: &str, words: &[(char, f64)]) {
-    text.push_str(command);
+fn line(text: &mut Vec<u8>, command: &str, words: &[(u8, f64)]) {
+    text.extend_from_slice(command.as_bytes());
     for &(letter, value) in words {
         word(text, letter, value, DECIMALS);
     }
-    text.push('\n');
+    text.push(b'\n');
 }
 
 /// F, to six significant digits, never 0; it ends the line.
-fn feed_word(text: &mut String, feed: f64) {
+fn feed_word(text: &mut Vec<u8>, feed: f64) {
     let (mut decimals, mut leading) = (5, feed);
     while leading >= 10.0 && decimals > 0 {
         (decimals, leading) = (decimals - 1, leading / 10.0);
@@ -186,24 +186,14 @@ fn feed_word(text: &mut String, feed: f64) {
     while leading < 1.0 && decimals < 12 {
         (decimals, leading) = (decimals + 1, leading * 10.0);
     }
-    word(text, 'F', feed.max(1.0e-12), decimals);
-    text.push('\n');
+    word(text, b'F', feed.max(1.0e-12), decimals);
+    text.push(b'\n');
 }
 
 /// A letter and a number without exponent, trailing zeros or a negative zero.
-fn word(text: &mut String, letter: char, value: f64, decimals: usize) {
-    text.push(' ');
-    text.push(letter);
-    let start = text.len();
-    // Formatting into a string cannot fail.
-    let _ = write!(text, "{value:.decimals$}");
-    if decimals > 0 {
-        let kept = text.trim_end_matches('0').trim_end_matches('.').len();
-        text.truncate(kept);
-    }
-    if &text[start..] == "-0" {
-        text.replace_range(start.., "0");
-    }
+fn word(text: &mut Vec<u8>, letter: u8, value: f64, decimals: usize) {
+    text.extend_from_slice(&[b' ', letter]);
+    fixed(text, value, decimals);
 }
 
 #[cfg(test)]
@@ -319,9 +309,9 @@ M2
             (1.0e-30, " F0.000000000001\n"),
             (1.0, " F1\n"),
         ] {
-            let mut text = String::new();
+            let mut text = Vec::new();
             feed_word(&mut text, feed);
-            assert_eq!(text, expected);
+            assert_eq!(text, expected.as_bytes());
         }
     }
 }

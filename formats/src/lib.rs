@@ -12,6 +12,7 @@ pub mod inspect;
 pub mod sample;
 pub mod step_out;
 
+mod decimal;
 pub mod output;
 
 pub mod csv;

@@ -3,33 +3,29 @@
 //! It is a picture to look at, not one to measure from: nothing is computed from it.
 
 mod render;
+mod sheet;
 
 use std::io::Write;
 use std::path::Path;
 
-use horma_core::{Discretization, Interval, Part, Point, Shape, ToolPath, Touch, discretize};
+use horma_core::{Part, Point, ToolPath, Touch};
 
 use crate::error::Result;
 use crate::output;
 
 pub use render::{Colour, Polyline, SIZE, png};
+pub use sheet::Sheet;
 
 /// Colour of the line along which the cutter touches.
 pub const CONTACT: Colour = [13, 71, 161];
 /// Colour of the line along which the tool centre runs.
 pub const CENTRE: Colour = [206, 112, 76];
 
-/// Chordal tolerance of a picture, of the length of the part: a fraction of a pixel.
-const TOLERANCE: f64 = 2.5e-4;
-
 /// Writes a picture of `part`, which lies as it is on the lathe, and of `path` around it.
 ///
 /// # Errors
-/// [`crate::Error::Io`], naming `file`; those of [`discretize`].
+/// [`crate::Error::Io`], naming `file`.
 pub fn save(file: &Path, part: &Part, path: &ToolPath) -> Result<()> {
-    let length = length(part);
-    let tolerance = Discretization::Tolerance((TOLERANCE * length).max(1.0e-3));
-    let triangles = discretize(part, tolerance)?.triangles();
     let touches = || path.touches.iter();
     let contact: Vec<_> = touches().map(|t| t.map(|t| t.contact)).collect();
     let centre = centres(path);
@@ -45,18 +41,8 @@ pub fn save(file: &Path, part: &Part, path: &ToolPath) -> Result<()> {
             width: 0.8,
         },
     ];
-    let picture = png(&triangles, &lines);
+    let picture = png(&sheet::sheets(part), &lines);
     output::write(file, |file| file.write_all(&picture))
-}
-
-/// Extent of the part along the spindle, mm.
-fn length(part: &Part) -> f64 {
-    let points = part.bodies.iter().flat_map(|body| match &body.shape {
-        Shape::Surface(surface) => surface.poles(),
-        Shape::Mesh(mesh) => mesh.vertices(),
-    });
-    let x = Interval::of(points.map(|p| p[0]));
-    x.high - x.low
 }
 
 /// The tool centre at each position as the part sees it: the cutter turns about the part.
@@ -71,7 +57,7 @@ fn centres(path: &ToolPath) -> Vec<Option<Point>> {
 
 #[cfg(test)]
 mod tests {
-    use horma_core::{Body, Mesh, Motion, MotionKind};
+    use horma_core::{Body, Interval, Mesh, Motion, MotionKind, Shape};
 
     use super::*;
 

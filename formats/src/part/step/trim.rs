@@ -100,27 +100,38 @@ fn parameters(direction: &Direction, points: usize) -> Vec<f64> {
 }
 
 fn lies_on(sides: &[Side], point: Point, tolerance: f64) -> bool {
-    sides.iter().any(|side| distance(side, point) <= tolerance)
+    let away = |p: Point| length(sub(p, point));
+    let mut candidates: Vec<(f64, usize, &Side)> = sides
+        .iter()
+        .filter_map(|side| {
+            let tabulated = side.points.iter().map(|&p| away(p)).enumerate();
+            let (nearest, distance) = tabulated.min_by(|a, b| a.1.total_cmp(&b.1))?;
+            Some((distance, nearest, side))
+        })
+        .collect();
+    // An edge lies on one side as a rule, and the search is what costs.
+    candidates.sort_by(|a, b| a.0.total_cmp(&b.0));
+    candidates.into_iter().any(|(distance, nearest, side)| {
+        distance <= tolerance || passes(side, nearest, point, tolerance)
+    })
 }
 
-/// From the nearest tabulated point on, by sections: the distance has one minimum near it.
-fn distance(side: &Side, point: Point) -> f64 {
-    let away = |p: Point| length(sub(p, point));
-    let tabulated = side.points.iter().map(|&p| away(p)).enumerate();
-    let Some((nearest, mut best)) = tabulated.min_by(|a, b| a.1.total_cmp(&b.1)) else {
-        return f64::INFINITY;
-    };
-    let at = |v: f64| away(side.surface.grid(&[side.at], &[v])[0]);
+/// Whether a side passes a point within the tolerance. From the nearest tabulated point on, by
+/// sections: the distance has one minimum near it.
+fn passes(side: &Side, nearest: usize, point: Point, tolerance: f64) -> bool {
+    let at = |v: f64| length(sub(side.surface.grid(&[side.at], &[v])[0], point));
     let mut low = side.vs[nearest.saturating_sub(1)];
     let mut high = side.vs[(nearest + 1).min(side.vs.len() - 1)];
     const SECTION: f64 = 0.618_033_988_749_894_8;
     for _ in 0..48 {
         let (a, b) = (high - SECTION * (high - low), low + SECTION * (high - low));
         let (at_a, at_b) = (at(a), at(b));
-        best = best.min(at_a).min(at_b);
+        if at_a.min(at_b) <= tolerance {
+            return true;
+        }
         if at_a < at_b { high = b } else { low = a }
     }
-    best
+    false
 }
 
 /// Points of an edge, mm; `None` if its curve cannot be read.

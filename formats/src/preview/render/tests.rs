@@ -8,16 +8,30 @@ fn square(half: f64, z: f64) -> [[Point; 3]; 2] {
     [[a, b, c], [a, c, d]]
 }
 
-fn picture(triangles: &[[Point; 3]], lines: &[Polyline]) -> Pixmap {
-    let picture = Pixmap::decode_png(&png(triangles, lines)).expect("a picture");
-    assert_eq!((picture.width(), picture.height()), SIZE);
-    picture
+fn picture(triangles: &[[Point; 3]], lines: &[Polyline]) -> Vec<Colour> {
+    let corners = (0..triangles.len() as u32 * 3).collect::<Vec<_>>();
+    let sheet = Sheet {
+        points: triangles.as_flattened().to_vec(),
+        normals: Vec::new(),
+        triangles: corners.as_chunks().0.to_vec(),
+    };
+    decoded(&png(&[sheet], lines))
+}
+
+fn decoded(file: &[u8]) -> Vec<Colour> {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(file))
+        .read_info()
+        .expect("a picture");
+    assert_eq!(reader.info().size(), SIZE);
+    let mut bytes = vec![0; (SIZE.0 * SIZE.1 * 3) as usize];
+    reader.next_frame(&mut bytes).expect("whole");
+    bytes.as_chunks().0.to_vec()
 }
 
 /// How many pixels have much more of the line's red than a part or a background has.
-fn red(picture: &Pixmap) -> usize {
-    let pixels = picture.pixels().iter();
-    pixels.filter(|p| p.red() > 150 && p.green() < 60).count()
+fn red(picture: &[Colour]) -> usize {
+    let pixels = picture.iter();
+    pixels.filter(|p| p[0] > 150 && p[1] < 60).count()
 }
 
 const RED: Colour = [220, 0, 0];
@@ -56,7 +70,7 @@ fn the_nearer_facet_is_seen_whichever_comes_first() {
     let (near, far) = (square(30.0, 10.0), square(50.0, 0.0));
     let one = picture(&[near, far].concat(), &[]);
     let other = picture(&[far, near].concat(), &[]);
-    assert!(one.data() == other.data());
+    assert!(one == other);
 }
 
 #[test]
@@ -69,6 +83,58 @@ fn nonsense_is_left_out() {
     ];
     let path = [Some([f64::NAN, 0.0, 0.0]), None];
     let with = picture(&[part.as_slice(), bad.as_slice()].concat(), &[line(&path)]);
-    assert!(with.data() == picture(&part, &[]).data());
+    assert!(with == picture(&part, &[]));
     picture(&[], &[]);
+}
+
+#[test]
+fn a_line_is_as_wide_as_it_is_wanted_and_has_no_knots() {
+    let mean = |steps: i32, width: f32| {
+        let at = |i: i32| Some([f64::from(i) / f64::from(steps), 0.1, 0.0]);
+        let points: Vec<_> = (-steps..=steps).map(at).collect();
+        let black = Polyline {
+            points: &points,
+            colour: [0; 3],
+            width,
+        };
+        let bare = picture(
+            &[],
+            &[Polyline {
+                width: 0.0,
+                ..black
+            }],
+        );
+        let drawn = picture(&[], &[black]);
+        let share = |(b, d): (&Colour, &Colour)| 1.0 - f64::from(d[1]) / f64::from(b[1]);
+        bare.iter().zip(&drawn).map(share).sum::<f64>()
+    };
+    let thin = mean(1, 0.8);
+    let wide = mean(1, 1.6) / thin;
+    assert!((wide - 2.0).abs() < 0.05, "{wide}");
+    let pieces = mean(400, 0.8) / thin;
+    assert!((pieces - 1.0).abs() < 0.05, "{pieces}");
+}
+
+#[test]
+fn a_smooth_sheet_is_lit_smoothly_and_a_crease_is_not() {
+    let [a, b] = square(50.0, 0.0);
+    let flat = picture(&[a, b], &[]);
+    let sheet = |normals: [Point; 4]| Sheet {
+        points: vec![a[0], a[1], a[2], b[2]],
+        normals: normals.to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let up = [0.0, 0.0, 1.0];
+    let leaning = unit([0.3, 0.0, 1.0]).expect("a direction");
+    let colours = |sheet: Sheet| {
+        let picture = decoded(&png(&[sheet], &[]));
+        picture
+            .into_iter()
+            .collect::<std::collections::HashSet<_>>()
+            .len()
+    };
+    assert!(decoded(&png(&[sheet([up; 4])], &[])) == flat);
+    let plain = colours(sheet([up; 4]));
+    assert!(colours(sheet([up, leaning, leaning, up])) > plain + 10);
+    assert_eq!(colours(sheet([[1.0, 0.0, 0.0]; 4])), plain);
 }
