@@ -9,6 +9,7 @@ mod error;
 mod tolerance;
 mod vector;
 
+mod evaluate;
 mod surface;
 
 mod part;
