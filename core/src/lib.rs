@@ -10,6 +10,7 @@ mod tolerance;
 mod vector;
 
 mod evaluate;
+mod jet;
 mod surface;
 
 mod part;

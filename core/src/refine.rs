@@ -1,8 +1,8 @@
 //! Grids for a chordal tolerance: as few points as the surface's curvature allows.
 //!
 //! The bends of the surface are sampled, the lines of both directions are balanced against each
-//! other so that the estimated points are fewest, and the grid they make is measured, four times
-//! denser than itself or more. Where it exceeds the tolerance, lines are added and only the cells
+//! other so that the estimated points are fewest, adjusted to what a few samples of each cell show, and
+//! the grid they make is measured, four times denser than itself or more. Where it exceeds the tolerance, lines are added and only the cells
 //! that changed are measured again.
 //!
 //! Creases are lines: a knot as often as the degree, across which facets would cut a corner off. Other
@@ -22,15 +22,15 @@ use crate::discretize::{Lines, MAX_LINES};
 use crate::error::{Error, Result};
 use crate::evaluate::Net;
 use crate::surface::Surface;
-use balance::{Densities, Grid, balance, grid};
-use curvature::{Bends, bends};
+use balance::{Densities, Grid, adjust, balance, grid};
+use curvature::{Bends, bends, bends_found};
 use measure::{Exceeding, Measured, density, measure, probe};
 
 /// Rounds of adding lines before giving up; none to two are usual.
 const ROUNDS: usize = 48;
 
-/// Times that a grid is laid, probed and laid anew before it is measured.
-const CORRECTIONS: usize = 3;
+/// Times that a grid is probed and laid anew before it is measured.
+const ADJUSTMENTS: usize = 2;
 
 /// Grids are laid to this part of the tolerance: what probes miss should not take lines of its own.
 const GOAL: f64 = 0.98;
@@ -44,8 +44,8 @@ const TRIAL_POINTS: f64 = (1 << 18) as f64;
 /// Finds the lines of a grid whose facets are within `tolerance` (mm) of the surface at every sample.
 pub(crate) fn refine(name: &str, surface: &Surface, tolerance: f64) -> Result<Lines> {
     let net = Net::new(surface);
-    let mut bends = bends(surface, tolerance);
-    let mut densities = balance(&bends, None);
+    let bends = bends(surface, tolerance);
+    let densities = balance(&bends);
     let not_reached = |grid: &Grid, measured: &Measured| Error::ToleranceNotReached {
         name: name.to_owned(),
         rows: grid.us.len(),
@@ -61,14 +61,10 @@ pub(crate) fn refine(name: &str, surface: &Surface, tolerance: f64) -> Result<Li
         return Err(not_reached(&grid, &measured));
     }
     let mut grid = lay(surface, &bends, &densities);
-    for _ in 0..CORRECTIONS {
-        let found: Vec<f64> = probe(&net, &grid)
-            .iter()
-            .map(|d| d / (GOAL * tolerance))
-            .collect();
-        bends.correct([&grid.us, &grid.vs], &found);
-        densities = balance(&bends, Some(&densities));
-        grid = lay(surface, &bends, &densities);
+    for _ in 0..ADJUSTMENTS {
+        let found = probed(&net, &grid, tolerance);
+        let cells = bends_found(&bends, [&grid.us, &grid.vs], &found);
+        grid = lay(surface, &cells, &adjust(&cells));
     }
     let mut measured = measure_all(&net, &grid, tolerance);
     for _ in 0..ROUNDS {
@@ -91,6 +87,15 @@ pub(crate) fn refine(name: &str, surface: &Surface, tolerance: f64) -> Result<Li
         };
     }
     Err(not_reached(&grid, &measured))
+}
+
+/// What is found by [`probe`], in units of what a grid is laid to.
+fn probed(net: &Net, grid: &Grid, tolerance: f64) -> Vec<[f64; 3]> {
+    let mut found = probe(net, grid);
+    for d in &mut found {
+        *d = d.map(|d| d / (GOAL * tolerance));
+    }
+    found
 }
 
 fn fits(rows: f64, columns: f64) -> bool {

@@ -14,10 +14,6 @@ const STEPS: usize = 40;
 const FIRST: f64 = 0.3;
 const SHORTER: f64 = 0.93;
 
-/// The same for a descent from what was best before.
-const STEPS_AGAIN: usize = 10;
-const AGAIN: f64 = 0.05;
-
 /// The sizes of neighbouring cells differ by no more than a factor of about one and this.
 const GROWTH: f64 = 1.0;
 
@@ -49,42 +45,17 @@ impl Densities {
     }
 }
 
-/// The densities that make the number of points least, found from those that did before the bends
-/// were corrected, if there are any.
-pub(super) fn balance(bends: &Bends, before: Option<&Densities>) -> Densities {
+/// The densities that make the number of points least.
+pub(super) fn balance(bends: &Bends) -> Densities {
     let (m, n) = (bends.us.len(), bends.vs.len());
-    // One cell to the whole direction, and to each direction what the other cannot help.
-    let range = |slots: &Slots| 1.0 / (slots.edges[slots.len()] - slots.edges[0]);
-    let floor_u: Vec<f64> = bends
-        .edges_u
-        .iter()
-        .map(|e| e.max(range(&bends.us)))
-        .collect();
-    let mut least = bends.edges_v.clone();
-    for row in bends.v.chunks_exact(n) {
-        for (least, v) in least.iter_mut().zip(row) {
-            *least = least.max(v.sqrt() * 1.001);
-        }
-    }
-    least.iter_mut().for_each(|l| *l = l.max(range(&bends.vs)));
-
-    let (mut v, mut step, steps): (Vec<f64>, f64, usize) = match before {
-        None => (
-            least.iter().map(|l| l * std::f64::consts::SQRT_2).collect(),
-            FIRST,
-            STEPS,
-        ),
-        Some(Densities { v, .. }) => (
-            v.iter().zip(&least).map(|(v, l)| v.max(*l)).collect(),
-            AGAIN,
-            STEPS_AGAIN,
-        ),
-    };
+    let (floor_u, least) = floors(bends);
+    let mut v: Vec<f64> = least.iter().map(|l| l * std::f64::consts::SQRT_2).collect();
+    let mut step = FIRST;
     let mut best = (f64::INFINITY, v.clone());
     let mut row = Row::new(n);
     let mut u = vec![0.0; m];
     let mut shares = vec![0.0; m * n];
-    for _ in 0..steps {
+    for _ in 0..STEPS {
         let sizes: Vec<f64> = v.iter().map(|v| 1.0 / v).collect();
         for k in 0..m {
             let shares = &mut shares[k * n..(k + 1) * n];
@@ -113,7 +84,53 @@ pub(super) fn balance(bends: &Bends, before: Option<&Densities>) -> Densities {
     settle(bends, &best.1, &floor_u, &least)
 }
 
-/// Rounds the densities of u up to whole lines, and takes from v what that leaves over.
+/// What a direction needs whatever the other does: one cell to the whole of it, lines for the edges
+/// and creases; for v, also what would take infinitely many lines of u.
+fn floors(bends: &Bends) -> (Vec<f64>, Vec<f64>) {
+    let range = |slots: &Slots| 1.0 / (slots.edges[slots.len()] - slots.edges[0]);
+    let floor_u: Vec<f64> = bends
+        .edges_u
+        .iter()
+        .map(|e| e.max(range(&bends.us)))
+        .collect();
+    let n = bends.vs.len();
+    let mut least = bends.edges_v.clone();
+    for row in bends.v.chunks_exact(n) {
+        for (least, v) in least.iter_mut().zip(row) {
+            *least = least.max(v.sqrt() * 1.001);
+        }
+    }
+    least.iter_mut().for_each(|l| *l = l.max(range(&bends.vs)));
+    (floor_u, least)
+}
+
+/// The densities for the bends that the cells of a grid were found to have, lines between them.
+pub(super) fn adjust(bends: &Bends) -> Densities {
+    let (floor_u, least) = floors(bends);
+    let n = bends.vs.len();
+    // A cell that is too large is made smaller in the direction in which it bends more.
+    let now = least.iter().enumerate();
+    let mut v: Vec<f64> = now
+        .map(|(l, least)| least.max(1.0 / bends.vs.width(l)))
+        .collect();
+    let sizes: Vec<f64> = v.iter().map(|v| 1.0 / v).collect();
+    for k in 0..bends.us.len() {
+        let x = bends.us.width(k);
+        for l in 0..n {
+            let i = k * n + l;
+            let (own, other) = (bends.v[i], bends.u[i]);
+            if own * sizes[l] * sizes[l] > other * x * x {
+                let needed = density_needed(own, other, bends.twist[i], bends.both[i], x);
+                let most = 2.0 / sizes[l];
+                let sound = needed > 0.0 && needed < most;
+                v[l] = v[l].max(if sound { needed } else { most });
+            }
+        }
+    }
+    settle(bends, &v, &floor_u, &least)
+}
+
+/// The densities of u that go with those of v, and of v the least that go with these.
 fn settle(bends: &Bends, v: &[f64], floor_u: &[f64], least: &[f64]) -> Densities {
     let n = bends.vs.len();
     let sizes: Vec<f64> = v.iter().map(|v| 1.0 / v).collect();

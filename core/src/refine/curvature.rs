@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::evaluate::{Derivatives, Jet, collapse_jet, derivatives};
+use crate::jet::{Derivatives, Jet, collapse_jet, derivatives};
 use crate::surface::{Direction, Surface};
 use crate::vector::{Point, add_scaled, cross, dot, length};
 
@@ -20,9 +20,6 @@ const FEW: usize = 24;
 
 /// Most slots of a direction.
 const MANY: usize = 512;
-
-/// Bends are corrected by no more than this factor at a time.
-const TRUST: f64 = 2.0;
 
 /// A direction cut into slots, each with samples of its own.
 pub(super) struct Slots {
@@ -51,6 +48,14 @@ impl Slots {
         }
         edges.push(breaks[pieces]);
         Self { edges, samples }
+    }
+
+    /// The intervals between lines.
+    fn between(lines: &[f64]) -> Self {
+        Self {
+            edges: lines.to_vec(),
+            samples: Vec::new(),
+        }
     }
 
     pub fn len(&self) -> usize {
@@ -103,6 +108,24 @@ impl Bend {
         both: 0.0,
     };
 
+    /// From bends along the normal.
+    fn new(u: f64, v: f64, twist: f64) -> Self {
+        let both = u * v >= 0.0;
+        // The facets share the diagonal on which both parameters grow. A twist towards the bend adds
+        // to it there; one away from it takes from it, and the rest of the cell is no worse.
+        let towards = if u + v >= 0.0 { twist } else { -twist };
+        Self {
+            u: u.abs(),
+            v: v.abs(),
+            twist: if both && u + v != 0.0 {
+                towards.max(0.0)
+            } else {
+                twist.abs()
+            },
+            both: f64::from(both),
+        }
+    }
+
     /// The larger of the two in everything.
     fn hull(self, other: Self) -> Self {
         Self {
@@ -115,55 +138,41 @@ impl Bend {
 }
 
 impl Bends {
-    /// The deviation that a cell of size x × y is expected to have in a pair of slots, in units of
-    /// the tolerance.
-    fn expected(&self, i: usize, x: f64, y: f64) -> f64 {
-        let (u, v) = (self.u[i] * x * x, self.v[i] * y * y);
-        u.max(v).max(self.both[i] * (u + v)) + 2.0 * self.twist[i] * x * y
+    fn new([us, vs]: [Slots; 2], all: &[Bend], [edges_u, edges_v]: [Vec<f64>; 2]) -> Self {
+        Self {
+            us,
+            vs,
+            u: all.iter().map(|b| b.u).collect(),
+            v: all.iter().map(|b| b.v).collect(),
+            twist: all.iter().map(|b| b.twist).collect(),
+            both: all.iter().map(|b| b.both).collect(),
+            edges_u,
+            edges_v,
+        }
     }
+}
 
-    /// Corrects the bends by the deviations that a grid's cells were found to have, by rows and
-    /// columns, in units of the tolerance.
-    pub fn correct(&mut self, [us, vs]: [&[f64]; 2], found: &[f64]) {
-        let n = self.vs.len();
-        let (rows, columns) = (self.us.under(us), self.vs.under(vs));
-        let mut factors = vec![0.0_f64; self.u.len()];
-        for ((row, across), found) in rows
-            .iter()
-            .zip(us.windows(2))
-            .zip(found.chunks_exact(columns.len()))
-        {
-            let x = across[1] - across[0];
-            for ((column, across), &found) in columns.iter().zip(vs.windows(2)).zip(found) {
-                let y = across[1] - across[0];
-                let slots = || {
-                    row.clone()
-                        .flat_map(|k| column.clone().map(move |l| k * n + l))
-                };
-                let expected = slots().fold(0.0, |most, i| self.expected(i, x, y).max(most));
-                // Where next to nothing is expected or found there is nothing to correct.
-                // Where a cell is too large although it was expected to be, for its slots differ and its
-                // size is between theirs, all of them are raised.
-                let factor = if expected > 1e-6 {
-                    found / expected
-                } else {
-                    1.0
-                };
-                let factor = if found > 1.0 {
-                    factor.max(found)
-                } else {
-                    factor
-                };
-                slots().for_each(|i| factors[i] = factors[i].max(factor));
-            }
-        }
-        for (i, factor) in factors.into_iter().enumerate() {
-            let factor = factor.clamp(1.0 / TRUST, TRUST);
-            self.u[i] *= factor;
-            self.v[i] *= factor;
-            self.twist[i] *= factor;
-        }
-    }
+/// The bends that a grid's cells were found to have: how far the middles of their sides along u,
+/// along v, and of the cells are off the facets, by rows and columns, in units of the tolerance.
+pub(super) fn bends_found(before: &Bends, [us, vs]: [&[f64]; 2], found: &[[f64; 3]]) -> Bends {
+    let n = vs.len() - 1;
+    let all = found.iter().enumerate().map(|(i, &[u, v, middle])| {
+        let (x, y) = (us[i / n + 1] - us[i / n], vs[i % n + 1] - vs[i % n]);
+        // What is off in the middle of the diagonal is the sum of both and of the twist.
+        Bend::new(u / (x * x), v / (y * y), (middle - u - v) / (2.0 * x * y))
+    });
+    let all: Vec<Bend> = all.collect();
+    let edges = |slots: &Slots, edges: &[f64], lines: &[f64]| {
+        let most = |slots: Range<usize>| edges[slots].iter().fold(0.0, |a: f64, &b| a.max(b));
+        slots.under(lines).into_iter().map(most).collect()
+    };
+    let edges_u = edges(&before.us, &before.edges_u, us);
+    let edges_v = edges(&before.vs, &before.edges_v, vs);
+    Bends::new(
+        [Slots::between(us), Slots::between(vs)],
+        &all,
+        [edges_u, edges_v],
+    )
 }
 
 /// Samples the bends of a surface.
@@ -208,16 +217,7 @@ pub(super) fn bends(surface: &Surface, tolerance: f64) -> Bends {
             edges_v[slot] = edges_v[slot].max((beside(d.vv, d.v) * scale).sqrt());
         }
     }
-    Bends {
-        u: all.iter().map(|b| b.u).collect(),
-        v: all.iter().map(|b| b.v).collect(),
-        twist: all.iter().map(|b| b.twist).collect(),
-        both: all.iter().map(|b| b.both).collect(),
-        us,
-        vs,
-        edges_u,
-        edges_v,
-    }
+    Bends::new([us, vs], &all, [edges_u, edges_v])
 }
 
 /// The bends along the normal; where there is none, in any direction.
@@ -235,20 +235,7 @@ fn bend(d: &Derivatives, scale: f64) -> Bend {
     }
     let along = |p: Point| dot(p, normal) / area * scale;
     let (u, v, twist) = (along(d.uu), along(d.vv), along(d.uv));
-    let both = u * v >= 0.0;
-    // The facets share the diagonal on which both parameters grow. A twist towards the bend adds
-    // to it there; one away from it takes from it, and the rest of the cell is no worse.
-    let towards = if u + v >= 0.0 { twist } else { -twist };
-    Bend {
-        u: u.abs(),
-        v: v.abs(),
-        twist: if both && u + v != 0.0 {
-            towards.max(0.0)
-        } else {
-            twist.abs()
-        },
-        both: f64::from(both),
-    }
+    Bend::new(u, v, twist)
 }
 
 /// How fast a curve with these derivatives leaves its tangent.

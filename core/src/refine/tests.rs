@@ -147,9 +147,9 @@ fn the_tolerance_holds_between_the_samples() {
             let found = deviation(&surface, &grid.us, &grid.vs);
             let size = (grid.us.len(), grid.vs.len());
             assert!(told <= tolerance, "{name} {tolerance}: {told}");
-            // What samples at a quarter of a cell miss of a smooth bend is at most a few per cent.
+            // A peak halfway between samples at quarters is missed by 4 (1/8)², a sixteenth.
             assert!(
-                found <= 1.03 * tolerance,
+                found <= 1.0625 * tolerance,
                 "{name} {tolerance}: {found} {size:?}"
             );
         }
@@ -212,7 +212,6 @@ fn a_plane_is_one_cell_however_many_pieces_it_has() {
         [5.0 * i, 2.0 * j, i - j]
     });
     let grid = refine("s", &plane, 0.001).expect("reachable");
-    // The ends of clamped knots are not evenly spaced, and neither are parameters: only the points are.
     assert_eq!((grid.us.len(), grid.vs.len()), (2, 2));
 }
 
