@@ -104,6 +104,13 @@ impl Coordinates {
         }
     }
 
+    fn resize(&mut self, len: usize, rational: bool) {
+        for c in [&mut self.x, &mut self.y, &mut self.z] {
+            c.resize(len, 0.0);
+        }
+        self.w.resize(if rational { len } else { 0 }, 0.0);
+    }
+
     fn clear(&mut self, len: usize, rational: bool) {
         for c in [&mut self.x, &mut self.y, &mut self.z] {
             c.clear();
@@ -158,7 +165,7 @@ impl<'a> Isolines<'a> {
         let surface = self.net.surface;
         self.collapse(&surface.u().basis(u), &mut line.curve);
         let rational = surface.weights().is_some();
-        line.points.clear(self.columns, rational);
+        line.points.resize(self.columns, rational);
         let (curve, points) = (&line.curve, &mut line.points);
         match surface.v().degree {
             1 => self.evaluate::<2>(curve, points),
@@ -217,17 +224,15 @@ impl<'a> Isolines<'a> {
         };
         for run in &self.runs {
             let len = run.end - run.start;
-            let share: [&[f64]; ORDER] = std::array::from_fn(|k| {
-                let start = k * self.columns + run.start;
-                &self.shares[start..start + len]
-            });
+            let mut share: [&[f64]; ORDER] = [&[]; ORDER];
+            for (k, share) in share.iter_mut().enumerate() {
+                *share = &self.shares[k * self.columns + run.start..][..len];
+            }
             let first = run.first_pole - self.poles.start;
             for (curve, points) in pairs.iter_mut() {
-                let poles = &curve[first..first + ORDER];
-                let pole: [f64; ORDER] = std::array::from_fn(|k| poles[k]);
-                let points = &mut points[run.start..run.end];
-                let share = share.map(|s| &s[..points.len()]);
-                for (i, point) in points.iter_mut().enumerate() {
+                let mut pole = [0.0; ORDER];
+                pole.copy_from_slice(&curve[first..first + ORDER]);
+                for (i, point) in points[run.start..][..len].iter_mut().enumerate() {
                     let mut sum = 0.0;
                     for k in 0..ORDER {
                         sum += share[k][i] * pole[k];
@@ -247,6 +252,7 @@ impl<'a> Isolines<'a> {
             (&curve.w, &mut points.w),
         ];
         for (curve, points) in pairs.into_iter().filter(|(c, _)| !c.is_empty()) {
+            points.fill(0.0);
             for run in &self.runs {
                 for k in 0..=self.net.surface.v().degree {
                     let shares = &self.shares[k * self.columns..];

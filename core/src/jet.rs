@@ -88,7 +88,9 @@ pub(crate) fn derivatives(curves: &[Vec<Homogeneous>; 3], v: &Jet, rational: boo
         let mut sum = [0.0; 4];
         let poles = &curves[by_u][v.first..v.first + v.order];
         for (&share, c) in v.values[by_v].iter().zip(poles) {
-            sum = std::array::from_fn(|k| sum[k] + share * c[k]);
+            for (sum, c) in sum.iter_mut().zip(c) {
+                *sum += share * c;
+            }
         }
         ([sum[0], sum[1], sum[2]], sum[3])
     };

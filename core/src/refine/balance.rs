@@ -10,9 +10,9 @@
 use super::curvature::{Bends, Slots};
 
 /// Steps of the descent, the first one's length, and what each leaves of it.
-const STEPS: usize = 40;
+const STEPS: usize = 24;
 const FIRST: f64 = 0.3;
-const SHORTER: f64 = 0.93;
+const SHORTER: f64 = 0.9;
 
 /// The sizes of neighbouring cells differ by no more than a factor of about one and this.
 const GROWTH: f64 = 1.0;

@@ -138,17 +138,25 @@ impl Bend {
 }
 
 impl Bends {
-    fn new([us, vs]: [Slots; 2], all: &[Bend], [edges_u, edges_v]: [Vec<f64>; 2]) -> Self {
+    /// None yet, over so many pairs of slots.
+    fn new([us, vs]: [Slots; 2], pairs: usize) -> Self {
         Self {
+            edges_u: vec![0.0; us.len()],
+            edges_v: vec![0.0; vs.len()],
             us,
             vs,
-            u: all.iter().map(|b| b.u).collect(),
-            v: all.iter().map(|b| b.v).collect(),
-            twist: all.iter().map(|b| b.twist).collect(),
-            both: all.iter().map(|b| b.both).collect(),
-            edges_u,
-            edges_v,
+            u: vec![0.0; pairs],
+            v: vec![0.0; pairs],
+            twist: vec![0.0; pairs],
+            both: vec![0.0; pairs],
         }
+    }
+
+    fn set(&mut self, i: usize, bend: Bend) {
+        self.u[i] = bend.u;
+        self.v[i] = bend.v;
+        self.twist[i] = bend.twist;
+        self.both[i] = bend.both;
     }
 }
 
@@ -156,23 +164,23 @@ impl Bends {
 /// along v, and of the cells are off the facets, by rows and columns, in units of the tolerance.
 pub(super) fn bends_found(before: &Bends, [us, vs]: [&[f64]; 2], found: &[[f64; 3]]) -> Bends {
     let n = vs.len() - 1;
-    let all = found.iter().enumerate().map(|(i, &[u, v, middle])| {
-        let (x, y) = (us[i / n + 1] - us[i / n], vs[i % n + 1] - vs[i % n]);
-        // What is off in the middle of the diagonal is the sum of both and of the twist.
-        Bend::new(u / (x * x), v / (y * y), (middle - u - v) / (2.0 * x * y))
-    });
-    let all: Vec<Bend> = all.collect();
+    let mut all = Bends::new([Slots::between(us), Slots::between(vs)], found.len());
+    for (k, row) in found.chunks_exact(n).enumerate() {
+        let x = all.us.width(k);
+        for (l, &[u, v, middle]) in row.iter().enumerate() {
+            let y = all.vs.width(l);
+            // What is off in the middle of the diagonal is the sum of both and of the twist.
+            let bend = Bend::new(u / (x * x), v / (y * y), (middle - u - v) / (2.0 * x * y));
+            all.set(k * n + l, bend);
+        }
+    }
     let edges = |slots: &Slots, edges: &[f64], lines: &[f64]| {
         let most = |slots: Range<usize>| edges[slots].iter().fold(0.0, |a: f64, &b| a.max(b));
         slots.under(lines).into_iter().map(most).collect()
     };
-    let edges_u = edges(&before.us, &before.edges_u, us);
-    let edges_v = edges(&before.vs, &before.edges_v, vs);
-    Bends::new(
-        [Slots::between(us), Slots::between(vs)],
-        &all,
-        [edges_u, edges_v],
-    )
+    all.edges_u = edges(&before.us, &before.edges_u, us);
+    all.edges_v = edges(&before.vs, &before.edges_v, vs);
+    all
 }
 
 /// Samples the bends of a surface.
@@ -217,7 +225,12 @@ pub(super) fn bends(surface: &Surface, tolerance: f64) -> Bends {
             edges_v[slot] = edges_v[slot].max((beside(d.vv, d.v) * scale).sqrt());
         }
     }
-    Bends::new([us, vs], &all, [edges_u, edges_v])
+    let mut bends = Bends::new([us, vs], cells);
+    for (i, bend) in all.into_iter().enumerate() {
+        bends.set(i, bend);
+    }
+    (bends.edges_u, bends.edges_v) = (edges_u, edges_v);
+    bends
 }
 
 /// The bends along the normal; where there is none, in any direction.

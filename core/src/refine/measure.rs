@@ -39,7 +39,7 @@ pub(super) struct Exceeding {
 pub(super) struct Measured {
     /// Largest deviation within the tolerance, mm.
     pub within: f64,
-    /// The cells beyond it, in order.
+    /// The cells beyond it.
     pub exceeding: Vec<Exceeding>,
 }
 
@@ -75,19 +75,30 @@ pub(super) fn measure(
     let (inside, corners) = places(grid, density[1], columns);
     let (inside, corners) = (Isolines::new(net, &inside), Isolines::new(net, &corners));
     let chunks = rows.par_chunks(CHUNK).map(|rows| {
-        let mut strip = Strip::new(columns.len());
+        let mut strip = Strip::new(columns);
         let mut measured = Measured::default();
         for (k, &row) in rows.iter().enumerate() {
             let follows = k > 0 && rows[k - 1] + 1 == row;
             strip.place::<true>(&corners, grid, row, follows);
             strip.bound(&inside, grid, density, row);
-            for (&column, &bound) in columns.iter().zip(&strip.bounds) {
+            // The likely worst first: it spares the others a look.
+            let most = strip.bounds.iter().fold(0.0, |a: f64, &b| greater(b, a));
+            let worst = strip.bounds.iter().position(|&b| b == most).unwrap_or(0);
+            let first = std::iter::once(worst);
+            for j in first.chain((0..columns.len()).filter(|&j| j != worst)) {
+                let column = columns[j];
                 // The far edges of the surface belong to the last cells, which have no next ones.
                 let last = row + 2 == grid.us.len() || column + 2 == grid.vs.len();
-                if bound <= measured.within * measured.within && !last {
+                if strip.bounds[j] <= measured.within * measured.within && !last {
                     continue;
                 }
-                let closeness = look(net, grid, density, [row, column], measured.within);
+                let closeness = look(
+                    net,
+                    grid,
+                    density,
+                    [row, column],
+                    [measured.within, tolerance],
+                );
                 if closeness.deviation <= tolerance {
                     measured.within = measured.within.max(closeness.deviation);
                 } else {
@@ -120,7 +131,7 @@ pub(super) fn probe(net: &Net, grid: &Grid) -> Vec<[f64; 3]> {
     let (inside, corners) = places(grid, 2, &columns);
     let (inside, corners) = (Isolines::new(net, &inside), Isolines::new(net, &corners));
     let chunks = rows.par_chunks(CHUNK).flat_map_iter(|rows| {
-        let mut strip = Strip::new(n);
+        let mut strip = Strip::new(&columns);
         let mut found = vec![[0.0; 3]; rows.len() * n];
         for (&row, found) in rows.iter().zip(found.chunks_exact_mut(n)) {
             strip.place::<false>(&corners, grid, row, row != rows[0]);
@@ -139,16 +150,26 @@ pub(super) fn probe(net: &Net, grid: &Grid) -> Vec<[f64; 3]> {
     chunks.collect()
 }
 
+/// Whether the columns follow each other, so that the far corners of one are the near ones of the next.
+fn beside(columns: &[usize]) -> bool {
+    columns.windows(2).all(|w| w[0] + 1 == w[1])
+}
+
 /// The parameters in v of the samples, and of the corners of the cells: all near ones, then all
-/// far ones.
+/// far ones, or those of columns that follow each other only once.
 fn places(grid: &Grid, across: usize, columns: &[usize]) -> (Vec<f64>, Vec<f64>) {
     let at = |j, b| part(&grid.vs, j, b, across);
     let inside = columns
         .iter()
         .flat_map(|&j| (0..across).map(move |b| at(j, b)));
-    let near = columns.iter().map(|&j| grid.vs[j]);
-    let far = columns.iter().map(|&j| grid.vs[j + 1]);
-    (inside.collect(), near.chain(far).collect())
+    let corners = if beside(columns) {
+        grid.vs[columns[0]..columns[0] + columns.len() + 1].to_vec()
+    } else {
+        let near = columns.iter().map(|&j| grid.vs[j]);
+        near.chain(columns.iter().map(|&j| grid.vs[j + 1]))
+            .collect()
+    };
+    (inside.collect(), corners)
 }
 
 /// The parameter at `part / parts` of cell `i`.
@@ -162,6 +183,8 @@ pub(super) fn part(lines: &[f64], i: usize, part: usize, parts: usize) -> f64 {
 /// One row of cells, and room for its samples.
 struct Strip {
     bounds: Vec<f64>,
+    /// From a cell's near corner to its far one.
+    to_far: usize,
     facets: [Planes; 2],
     near: Isoline,
     far: Isoline,
@@ -180,10 +203,12 @@ const NUMBERS: usize = 15;
 struct Planes([Vec<f64>; NUMBERS]);
 
 impl Strip {
-    fn new(cells: usize) -> Self {
+    fn new(columns: &[usize]) -> Self {
+        let cells = columns.len();
         let planes = || Planes(std::array::from_fn(|_| vec![0.0; cells]));
         Self {
             bounds: vec![0.0; cells],
+            to_far: if beside(columns) { 1 } else { cells },
             facets: [planes(), planes()],
             near: Isoline::default(),
             far: Isoline::default(),
@@ -221,13 +246,13 @@ impl Strip {
             corners.at(grid.us[row], &mut self.near);
         }
         corners.at(grid.us[row + 1], &mut self.far);
-        let n = self.bounds.len();
+        let far_side = self.to_far;
         self.bounds.fill(0.0);
         // As in `row::facets`: the diagonal runs from the first corner to the last.
         let (near, far) = (&self.near.points, &self.far.points);
-        let corners = [(near, 0), (far, 0), (far, n)];
+        let corners = [(near, 0), (far, 0), (far, far_side)];
         self.facets[0].set::<SIDEWAYS>(&mut self.bounds, corners);
-        let corners = [(near, 0), (far, n), (near, n)];
+        let corners = [(near, 0), (far, far_side), (near, far_side)];
         self.facets[1].set::<SIDEWAYS>(&mut self.bounds, corners);
     }
 }
@@ -336,18 +361,22 @@ fn greater(a: f64, b: f64) -> f64 {
 
 /// Distance from `p` to the triangle, and whether it lies over it.
 pub(super) fn to_triangle(p: Point, [a, b, c]: [Point; 3]) -> (f64, bool) {
+    if let Some(distance) = over_triangle(p, [a, b, c]) {
+        return (distance, true);
+    }
+    let edges = [to_chord(p, a, b), to_chord(p, b, c), to_chord(p, c, a)];
+    (edges[0].min(edges[1]).min(edges[2]), false)
+}
+
+/// Distance from `p` to the plane of the triangle, if it lies over it.
+#[inline(always)]
+pub(super) fn over_triangle(p: Point, [a, b, c]: [Point; 3]) -> Option<f64> {
     let (ab, ac, ap) = (sub(b, a), sub(c, a), sub(p, a));
     let n = cross(ab, ac);
     let square = dot(n, n);
-    if square > 0.0 {
-        let s = dot(cross(ap, ac), n) / square;
-        let t = dot(cross(ab, ap), n) / square;
-        if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
-            return (dot(ap, n).abs() / square.sqrt(), true);
-        }
-    }
-    let edges = [(a, b), (b, c), (c, a)].map(|(a, b)| to_chord(p, a, b));
-    (edges[0].min(edges[1]).min(edges[2]), false)
+    let (s, t) = (dot(cross(ap, ac), n), dot(cross(ab, ap), n));
+    let over = square > 0.0 && s >= 0.0 && t >= 0.0 && s + t <= square;
+    over.then(|| dot(ap, n).abs() / square.sqrt())
 }
 
 /// Distance from `p` to the segment from `a` to `b`.

@@ -4,7 +4,7 @@
 //! why it was asked for. It is slow, and meant for the few cells that bounds do not settle.
 
 use super::balance::Grid;
-use super::measure::{part, to_chord, to_triangle};
+use super::measure::{over_triangle, part, to_chord, to_triangle};
 use crate::evaluate::Net;
 use crate::vector::Point;
 
@@ -19,13 +19,14 @@ pub(super) struct Closeness {
     pub along_v: f64,
 }
 
-/// The deviation of a cell, unless it is no more than `known`.
+/// The deviation of a cell, unless it is no more than `known`; if it exceeds the tolerance, those of its
+/// chords as well.
 pub(super) fn look(
     net: &Net,
     grid: &Grid,
     [along, across]: [usize; 2],
     [row, column]: [usize; 2],
-    known: f64,
+    [known, tolerance]: [f64; 2],
 ) -> Closeness {
     let ts = |lines: &[f64], i: usize, n: usize| -> Vec<f64> {
         (0..=n).map(|k| part(lines, i, k, n)).collect()
@@ -43,17 +44,34 @@ pub(super) fn look(
             let p = at(a, b);
             let side = usize::from(a * across <= b * along);
             let (mut deviation, over) = to_triangle(p, own[side]);
-            if !over && deviation > known.max(found.deviation) {
+            let enough = known.max(found.deviation);
+            if !over && deviation > enough {
                 let around = around.get_or_insert_with(|| neighbours(net, grid, row, column));
-                let all = around.iter().map(|&f| to_triangle(p, f).0);
-                deviation = all.fold(deviation, f64::min);
+                deviation = to_nearest(p, around, deviation, enough);
             }
             found.deviation = found.deviation.max(deviation);
+        }
+    }
+    if found.deviation > tolerance {
+        for (a, b) in (0..=along).flat_map(|a| (0..=across).map(move |b| (a, b))) {
+            let p = at(a, b);
             found.along_u = found.along_u.max(to_chord(p, at(0, b), at(along, b)));
             found.along_v = found.along_v.max(to_chord(p, at(a, 0), at(a, across)));
         }
     }
     found
+}
+
+/// Distance to the nearest facet, or to any that is no further than `enough`.
+fn to_nearest(p: Point, facets: &[[Point; 3]], known: f64, enough: f64) -> f64 {
+    // Mostly it is the one that the sample lies over, which costs least to find.
+    let over = facets.iter().filter_map(|&f| over_triangle(p, f));
+    let least = over.fold(known, f64::min);
+    if least <= enough {
+        return least;
+    }
+    let all = facets.iter().map(|&f| to_triangle(p, f).0);
+    all.fold(least, f64::min)
 }
 
 /// The facets of a cell from its corners, u growing first: as in `row::facets`.
