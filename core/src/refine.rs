@@ -1,9 +1,9 @@
 //! Grids for a chordal tolerance: as few points as the surface's curvature allows.
 //!
-//! The bends of the surface are sampled, the lines of both directions are balanced against each
-//! other so that the estimated points are fewest, adjusted to what a few samples of each cell show, and
-//! the grid they make is measured, four times denser than itself or more. Where it exceeds the tolerance, lines are added and only the cells
-//! that changed are measured again.
+//! The bends of the surface are sampled, and the lines of both directions are balanced against each
+//! other so that the estimated points are fewest. The grid is adjusted to what a few samples of each
+//! cell show, and then measured, four times denser than itself or more. Where it exceeds the
+//! tolerance, lines are added, and only the cells that changed are measured again.
 //!
 //! Creases are lines: a knot as often as the degree, across which facets would cut a corner off. Other
 //! knots are not, since there the surface has a tangent plane and all that a facet sees of it is how
