@@ -7,6 +7,7 @@
 use std::collections::HashMap;
 
 use crate::error::{Error, Result};
+use crate::evaluate::{Isoline, Isolines, Net};
 use crate::job::Discretization;
 use crate::part::{Body, Mesh, Part, Shape};
 use crate::record::BodyRecord;
@@ -156,12 +157,16 @@ fn evenly(direction: &Direction, n: usize) -> Vec<f64> {
 }
 
 fn add_isolines(rows: &mut Vec<Row>, surface: &Surface, grid: &Lines) {
-    let points = surface.grid(&grid.us, &grid.vs);
+    let net = Net::new(surface);
+    let isolines = Isolines::new(&net, &grid.vs);
+    let mut line = Isoline::default();
     let last = grid.us.len() - 1;
-    for (i, points) in points.chunks_exact(grid.vs.len()).enumerate() {
+    for (i, &u) in grid.us.iter().enumerate() {
+        isolines.at(u, &mut line);
+        let points = (0..grid.vs.len()).map(|j| line.points.point(j));
         rows.push(Row {
             id: rows.len() as u32,
-            points: points.to_vec(),
+            points: points.collect(),
             kind: RowKind::Isoline {
                 joins_next: i < last,
             },

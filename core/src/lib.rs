@@ -9,6 +9,8 @@ mod error;
 mod tolerance;
 mod vector;
 
+mod evaluate;
+mod jet;
 mod surface;
 
 mod part;

@@ -1,261 +1,173 @@
-//! Grids for a chordal tolerance: as many lines in each polynomial piece as its curvature needs.
+//! Grids for a chordal tolerance: as few points as the surface's curvature allows.
 //!
-//! Every knot is a line, so that no facet spans a crease. Each piece is divided evenly, and the
-//! number of divisions is found by measuring: the surface is sampled four times denser than the grid
-//! in both directions, and the deviation of a chord falls with the square of the divisions.
+//! The bends of the surface are sampled, and the lines of both directions are balanced against each
+//! other so that the estimated points are fewest. The grid is adjusted to what a few samples of each
+//! cell show, and then measured, four times denser than itself or more. Where it exceeds the
+//! tolerance, lines are added, and only the cells that changed are measured again.
+//!
+//! Creases are lines: a knot as often as the degree, across which facets would cut a corner off. Other
+//! knots are not, since there the surface has a tangent plane and all that a facet sees of it is how
+//! fast it bends, which is bounded on both sides. So a surface of many pieces, as interpolation makes
+//! them, gets no more lines than a smooth one.
+//!
+//! What is refused: a tolerance that would take more points than there is room to count. The
+//! lines depend on + − × ÷ √ and on maxima alone, and are the same for any number of threads.
 
-use rayon::prelude::*;
+mod balance;
+mod curvature;
+mod measure;
+mod near;
 
 use crate::discretize::{Lines, MAX_LINES};
 use crate::error::{Error, Result};
-use crate::surface::{Direction, Surface};
-use crate::vector::{Point, add_scaled, cross, dot, length, sub};
+use crate::evaluate::Net;
+use crate::surface::Surface;
+use balance::{Densities, Grid, adjust, balance, grid};
+use curvature::{Bends, bends, bends_found};
+use measure::{Exceeding, Measured, density, measure, probe};
 
-/// Samples to a cell's side.
-const DENSITY: usize = 4;
+/// Rounds of adding lines before giving up; none to two are usual.
+const ROUNDS: usize = 48;
 
-/// Rounds of measuring and dividing before giving up; three are usual.
-const ROUNDS: usize = 24;
+/// Times that a grid is probed and laid anew before it is measured.
+const ADJUSTMENTS: usize = 2;
+
+/// Grids are laid to this part of the tolerance: what probes miss should not take lines of its own.
+const GOAL: f64 = 0.98;
 
 /// Most points of one surface's grid.
 const MAX_POINTS: usize = 1 << 26;
 
+/// Points of the grid that is measured when the one asked for has too many.
+const TRIAL_POINTS: f64 = (1 << 18) as f64;
+
 /// Finds the lines of a grid whose facets are within `tolerance` (mm) of the surface at every sample.
 pub(crate) fn refine(name: &str, surface: &Surface, tolerance: f64) -> Result<Lines> {
-    let mut u = Divisions::new(surface.u());
-    let mut v = Divisions::new(surface.v());
-    let mut found = f64::INFINITY;
+    let net = Net::new(surface);
+    let bends = bends(surface, tolerance);
+    let densities = balance(&bends);
+    let not_reached = |grid: &Grid, measured: &Measured| Error::ToleranceNotReached {
+        name: name.to_owned(),
+        rows: grid.us.len(),
+        columns: grid.vs.len(),
+        deviation: measured.worst(),
+        tolerance,
+    };
+    let [m, n] = densities.lines(&bends);
+    if !fits(m, n) {
+        let fewer = (TRIAL_POINTS / (m * n)).sqrt();
+        let grid = lay(surface, &bends, &densities.scaled(fewer));
+        let measured = measure_all(&net, &grid, tolerance);
+        return Err(not_reached(&grid, &measured));
+    }
+    let mut grid = lay(surface, &bends, &densities);
+    for _ in 0..ADJUSTMENTS {
+        let found = probed(&net, &grid, tolerance);
+        let cells = bends_found(&bends, [&grid.us, &grid.vs], &found);
+        grid = lay(surface, &cells, &adjust(&cells));
+    }
+    let mut measured = measure_all(&net, &grid, tolerance);
     for _ in 0..ROUNDS {
-        let (us, vs) = (u.lines(1), v.lines(1));
-        if us.len().max(vs.len()) > MAX_LINES || us.len() * vs.len() > MAX_POINTS {
+        if measured.exceeding.is_empty() {
+            return Ok(Lines {
+                us: grid.us,
+                vs: grid.vs,
+                deviation: Some(measured.within),
+            });
+        }
+        let changed = split(&mut grid, &measured.exceeding);
+        if !fits(grid.us.len() as f64, grid.vs.len() as f64) {
             break;
         }
-        let worst = measure(surface, &mut u, &mut v);
-        found = worst;
-        if worst <= tolerance {
-            let deviation = Some(worst);
-            return Ok(Lines { us, vs, deviation });
-        }
-        // Half of the tolerance for each direction: the deviations along u and v add up.
-        let grown = u.grow(tolerance / 2.0) | v.grow(tolerance / 2.0);
-        if !grown {
-            u.grow_where_exceeding(tolerance);
-            v.grow_where_exceeding(tolerance);
-        }
+        // What was measured in cells that are no more stays in the maximum, above what is now there.
+        let again = measure_changed(&net, &grid, tolerance, changed);
+        measured = Measured {
+            within: measured.within.max(again.within),
+            ..again
+        };
     }
-    Err(Error::ToleranceNotReached {
-        name: name.to_owned(),
-        rows: u.lines(1).len(),
-        columns: v.lines(1).len(),
-        deviation: found,
-        tolerance,
-    })
+    Err(not_reached(&grid, &measured))
 }
 
-/// One parametric direction, its pieces and what was measured in each.
-struct Divisions {
-    breaks: Vec<f64>,
-    count: Vec<usize>,
-    /// Largest deviation of a chord along this direction, by piece.
-    chord: Vec<f64>,
-    /// Largest deviation of a facet, by piece.
-    facet: Vec<f64>,
+/// What is found by [`probe`], in units of what a grid is laid to.
+fn probed(net: &Net, grid: &Grid, tolerance: f64) -> Vec<[f64; 3]> {
+    let mut found = probe(net, grid);
+    for d in &mut found {
+        *d = d.map(|d| d / (GOAL * tolerance));
+    }
+    found
 }
 
-impl Divisions {
-    fn new(direction: &Direction) -> Self {
-        let breaks = direction.breaks();
-        let pieces = breaks.len() - 1;
-        Self {
-            breaks,
-            count: vec![1; pieces],
-            chord: vec![0.0; pieces],
-            facet: vec![0.0; pieces],
-        }
-    }
-
-    /// The lines, each interval between them divided `density` times.
-    fn lines(&self, density: usize) -> Vec<f64> {
-        let mut lines = vec![self.breaks[0]];
-        for (piece, &count) in self.breaks.windows(2).zip(&self.count) {
-            let n = count * density;
-            let inner = (1..n).map(|i| piece[0] + (piece[1] - piece[0]) * (i as f64 / n as f64));
-            lines.extend(inner.chain([piece[1]]));
-        }
-        lines
-    }
-
-    fn raise(&mut self, piece: usize, deviation: &Deviation) {
-        self.chord[piece] = self.chord[piece].max(deviation.chord);
-        self.facet[piece] = self.facet[piece].max(deviation.facet);
-    }
-
-    /// The piece of each cell.
-    fn pieces(&self) -> Vec<usize> {
-        let cells = self.count.iter().enumerate();
-        cells
-            .flat_map(|(i, &n)| std::iter::repeat_n(i, n))
-            .collect()
-    }
-
-    /// Divides further where a chord deviates by more than `allowed`; tells whether it did.
-    fn grow(&mut self, allowed: f64) -> bool {
-        let mut grown = false;
-        for (count, &chord) in self.count.iter_mut().zip(&self.chord) {
-            if chord > allowed {
-                let ratio = (chord / allowed).sqrt();
-                *count = (*count as f64 * ratio).ceil().max(*count as f64 + 1.0) as usize;
-                grown = true;
-            }
-        }
-        grown
-    }
-
-    /// Divides further where only the facets, by their twist, still deviate.
-    fn grow_where_exceeding(&mut self, tolerance: f64) {
-        for (count, &facet) in self.count.iter_mut().zip(&self.facet) {
-            if facet > tolerance {
-                *count += 1 + *count / 8;
-            }
-        }
-    }
+fn fits(rows: f64, columns: f64) -> bool {
+    rows.max(columns) <= MAX_LINES as f64 && rows * columns <= MAX_POINTS as f64
 }
 
-/// Measures chords and facets against a denser sampling; returns the largest deviation of a facet.
-fn measure(surface: &Surface, u: &mut Divisions, v: &mut Divisions) -> f64 {
-    for d in [&mut *u, &mut *v] {
-        d.chord.fill(0.0);
-        d.facet.fill(0.0);
-    }
-    let (us, vs) = (u.lines(DENSITY), v.lines(DENSITY));
-    let (u_pieces, v_pieces) = (u.pieces(), v.pieces());
-    // One strip of cells at a time: the dense sampling is never held as a whole.
-    let strips: Vec<(Deviation, Vec<Deviation>)> = (0..u_pieces.len())
-        .into_par_iter()
-        .map(|i| {
-            let strip = surface.grid(&us[i * DENSITY..=(i + 1) * DENSITY], &vs);
-            let mut along = Deviation::default();
-            let mut across = vec![Deviation::default(); v.count.len()];
-            for (j, &v_piece) in v_pieces.iter().enumerate() {
-                let cell = |a: usize, b: usize| strip[a * vs.len() + j * DENSITY + b];
-                let (along_u, along_v, facet) = measure_cell(cell);
-                along.raise(along_u, facet);
-                across[v_piece].raise(along_v, facet);
-            }
-            (along, across)
-        })
-        .collect();
-    let mut worst = 0.0_f64;
-    for (&u_piece, (along, across)) in u_pieces.iter().zip(&strips) {
-        u.raise(u_piece, along);
-        for (piece, deviation) in across.iter().enumerate() {
-            v.raise(piece, deviation);
+fn lay(surface: &Surface, bends: &Bends, densities: &Densities) -> Grid {
+    let (u, v) = (surface.u().creases(), surface.v().creases());
+    grid(densities, bends, [&u, &v])
+}
+
+fn densities_of_samples(net: &Net, grid: &Grid) -> [usize; 2] {
+    [
+        density(net.surface.u(), &grid.us),
+        density(net.surface.v(), &grid.vs),
+    ]
+}
+
+fn measure_all(net: &Net, grid: &Grid, tolerance: f64) -> Measured {
+    let rows: Vec<usize> = (0..grid.us.len() - 1).collect();
+    let columns: Vec<usize> = (0..grid.vs.len() - 1).collect();
+    let samples = densities_of_samples(net, grid);
+    measure(net, grid, samples, tolerance, &rows, &columns)
+}
+
+/// Measures the rows and the columns that changed, each cell once.
+fn measure_changed(
+    net: &Net,
+    grid: &Grid,
+    tolerance: f64,
+    [rows, columns]: [Vec<usize>; 2],
+) -> Measured {
+    let all: Vec<usize> = (0..grid.vs.len() - 1).collect();
+    let samples = densities_of_samples(net, grid);
+    let mut measured = measure(net, grid, samples, tolerance, &rows, &all);
+    let others = (0..grid.us.len() - 1).filter(|row| rows.binary_search(row).is_err());
+    let others: Vec<usize> = others.collect();
+    let crossing = measure(net, grid, samples, tolerance, &others, &columns);
+    measured.within = measured.within.max(crossing.within);
+    measured.exceeding.extend(crossing.exceeding);
+    measured
+}
+
+/// Adds a line through every cell that exceeds the tolerance, across its worse direction; gives the
+/// rows and columns of cells that are new or beside new ones.
+fn split(grid: &mut Grid, exceeding: &[Exceeding]) -> [Vec<usize>; 2] {
+    let of_rows = |e: &&Exceeding| e.closeness.along_u >= e.closeness.along_v;
+    let (rows, columns): (Vec<&Exceeding>, _) = exceeding.iter().partition(of_rows);
+    let rows = rows.iter().map(|e| e.row).collect();
+    let columns = columns.iter().map(|e| e.column).collect();
+    [halve(&mut grid.us, rows), halve(&mut grid.vs, columns)]
+}
+
+/// Halves some of the intervals between lines; gives the halves and their neighbours.
+fn halve(lines: &mut Vec<f64>, mut intervals: Vec<usize>) -> Vec<usize> {
+    intervals.sort_unstable();
+    intervals.dedup();
+    let mut changed = Vec::new();
+    for (added, &i) in intervals.iter().enumerate() {
+        let i = i + added;
+        let middle = lines[i] + (lines[i + 1] - lines[i]) / 2.0;
+        // Doubles between two neighbouring ones there are none.
+        if middle > lines[i] && middle < lines[i + 1] {
+            lines.insert(i + 1, middle);
         }
-        worst = worst.max(along.facet);
+        changed.extend(i.saturating_sub(1)..=i + 2);
     }
-    worst
-}
-
-/// Largest deviations, mm.
-#[derive(Clone, Copy, Default)]
-struct Deviation {
-    chord: f64,
-    facet: f64,
-}
-
-impl Deviation {
-    fn raise(&mut self, chord: f64, facet: f64) {
-        self.chord = self.chord.max(chord);
-        self.facet = self.facet.max(facet);
-    }
-}
-
-/// Deviations of the chords along u, of those along v, and of the two facets of a cell, given its
-/// samples.
-fn measure_cell(at: impl Fn(usize, usize) -> Point) -> (f64, f64, f64) {
-    let (mut along_u, mut along_v, mut facet) = (0.0_f64, 0.0_f64, 0.0_f64);
-    for a in 0..=DENSITY {
-        for b in 0..=DENSITY {
-            let p = at(a, b);
-            along_u = along_u.max(to_chord(p, at(0, b), at(DENSITY, b)));
-            along_v = along_v.max(to_chord(p, at(a, 0), at(a, DENSITY)));
-            // The facets share the diagonal from (0, 0); a sample is held against the one that its
-            // parameters fall into.
-            let third = if a > b {
-                at(DENSITY, 0)
-            } else {
-                at(0, DENSITY)
-            };
-            facet = facet.max(to_triangle(p, at(0, 0), third, at(DENSITY, DENSITY)));
-        }
-    }
-    (along_u, along_v, facet)
-}
-
-/// Distance from `p` to the segment from `a` to `b`.
-fn to_chord(p: Point, a: Point, b: Point) -> f64 {
-    let (ap, ab) = (sub(p, a), sub(b, a));
-    let square = dot(ab, ab);
-    let t = if square > 0.0 {
-        (dot(ap, ab) / square).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    length(add_scaled(ap, -t, ab))
-}
-
-/// Distance from `p` to the triangle.
-fn to_triangle(p: Point, a: Point, b: Point, c: Point) -> f64 {
-    let (ab, ac, ap) = (sub(b, a), sub(c, a), sub(p, a));
-    let n = cross(ab, ac);
-    let square = dot(n, n);
-    if square > 0.0 {
-        let s = dot(cross(ap, ac), n) / square;
-        let t = dot(cross(ab, ap), n) / square;
-        if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
-            return dot(ap, n).abs() / square.sqrt();
-        }
-    }
-    to_chord(p, a, b)
-        .min(to_chord(p, b, c))
-        .min(to_chord(p, c, a))
+    changed.sort_unstable();
+    changed.dedup();
+    changed.retain(|&i| i + 1 < lines.len());
+    changed
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::surface::tests::quarter_cylinder;
-
-    #[test]
-    fn a_cylinder_gets_what_its_curvature_needs_and_no_more() {
-        let surface = quarter_cylinder(50.0, 100.0);
-        for tolerance in [1.0, 0.1, 0.01, 0.001] {
-            let grid = refine("s", &surface, tolerance).expect("reachable");
-            assert_eq!(grid.us.len(), 2, "straight along x");
-            assert!(grid.deviation.expect("measured") <= tolerance);
-            // The chord of an arc of angle a sags by r(1 − cos(a/2)).
-            let angle = 2.0 * (1.0 - tolerance / 50.0_f64).acos();
-            let needed = (std::f64::consts::FRAC_PI_2 / angle).ceil();
-            let cells = (grid.vs.len() - 1) as f64;
-            assert!(cells >= needed && cells <= 2.0 * needed, "{cells} {needed}");
-        }
-    }
-
-    #[test]
-    fn an_unreachable_tolerance_is_refused() {
-        let quadratic = || Direction {
-            degree: 2,
-            knots: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
-        };
-        let pole = |i: usize| {
-            let (x, z) = ((i / 3) as f64 * 1e5, (i % 3) as f64 * 1e5);
-            [x, (x * z).sqrt(), z]
-        };
-        let poles = (0..9).map(pole).collect();
-        let bump = Surface::new("bump", quadratic(), quadratic(), poles, None).expect("valid");
-        assert!(matches!(
-            refine("bump", &bump, 1e-6),
-            Err(Error::ToleranceNotReached { .. })
-        ));
-    }
-}
+mod tests;

@@ -1,10 +1,10 @@
 //! B-spline surfaces, rational or not: validated once, then evaluated on grids of parameters.
 //!
-//! Evaluation collapses the net of poles to one curve for each u and then evaluates that curve at
-//! every v, with basis functions computed once. It uses + − × ÷ only and always in the same order,
-//! so a grid is the same bits wherever it is computed.
+//! A surface that exists is sound: degrees, knots, poles and weights agree, and no knot tears it.
+//! How the points are computed is `evaluate`'s business; trimming curves are nobody's.
 
 use crate::error::{Error, Result};
+use crate::evaluate::Net;
 use crate::part::check_points;
 use crate::vector::Point;
 
@@ -49,8 +49,19 @@ impl Direction {
         breaks
     }
 
+    /// The ends of the domain and, between them, the knots where the surface may have a crease:
+    /// those as often as the degree, where only the points on both sides need to agree.
+    pub(crate) fn creases(&self) -> Vec<f64> {
+        let (low, high) = self.domain();
+        let inner = self.knots[self.degree + 1..self.count()].chunk_by(|a, b| a == b);
+        let sharp =
+            inner.filter(|same| same.len() >= self.degree && same[0] > low && same[0] < high);
+        let sharp = sharp.map(|same| same[0]);
+        [low].into_iter().chain(sharp).chain([high]).collect()
+    }
+
     /// Index of the piece that holds `t`: `knots[span] ≤ t < knots[span + 1]`, the last one closed.
-    fn span(&self, t: f64) -> usize {
+    pub(crate) fn span(&self, t: f64) -> usize {
         let end = self.count();
         let upper = self.knots[self.degree + 1..end].partition_point(|&k| k <= t);
         let mut span = self.degree + upper;
@@ -60,15 +71,23 @@ impl Direction {
         span
     }
 
-    /// The `degree + 1` basis functions that do not vanish at `t`, and the first pole they weigh
-    /// (Piegl and Tiller, The NURBS Book, A2.2).
-    fn basis(&self, t: f64) -> Basis {
+    /// The `degree + 1` basis functions that do not vanish at `t`, and the first pole they weigh.
+    pub(crate) fn basis(&self, t: f64) -> Basis {
         let span = self.span(t);
+        Basis {
+            first: span - self.degree,
+            values: self.basis_in(span, self.degree, t),
+        }
+    }
+
+    /// The basis functions of a degree up to this direction's own that do not vanish in a piece
+    /// (Piegl and Tiller, The NURBS Book, A2.2).
+    pub(crate) fn basis_in(&self, span: usize, degree: usize, t: f64) -> [f64; MAX_DEGREE + 1] {
         let mut values = [0.0; MAX_DEGREE + 1];
         let mut left = [0.0; MAX_DEGREE + 1];
         let mut right = [0.0; MAX_DEGREE + 1];
         values[0] = 1.0;
-        for j in 1..=self.degree {
+        for j in 1..=degree {
             left[j] = t - self.knots[span + 1 - j];
             right[j] = self.knots[span + j] - t;
             let mut saved = 0.0;
@@ -79,10 +98,7 @@ impl Direction {
             }
             values[j] = saved;
         }
-        Basis {
-            first: span - self.degree,
-            values,
-        }
+        values
     }
 
     fn check(&self, name: &str, which: &str) -> Result<()> {
@@ -134,9 +150,12 @@ impl Direction {
     }
 }
 
-struct Basis {
-    first: usize,
-    values: [f64; MAX_DEGREE + 1],
+/// Basis functions at one parameter.
+pub(crate) struct Basis {
+    /// The first pole they weigh.
+    pub first: usize,
+    /// One for each pole from there on.
+    pub values: [f64; MAX_DEGREE + 1],
 }
 
 impl Surface {
@@ -248,41 +267,7 @@ impl Surface {
     /// The points at every pair of parameters, `us.len() × vs.len()`, v running fastest, mm.
     /// Eq. (3) of the 2001 paper.
     pub fn grid(&self, us: &[f64], vs: &[f64]) -> Vec<Point> {
-        let columns: Vec<Basis> = vs.iter().map(|&v| self.v.basis(v)).collect();
-        let mut curve = vec![[0.0; 4]; self.v.count()];
-        let mut points = Vec::with_capacity(us.len() * vs.len());
-        for &u in us {
-            self.collapse(&self.u.basis(u), &mut curve);
-            points.extend(columns.iter().map(|b| self.point(b, &curve)));
-        }
-        points
-    }
-
-    /// The isocurve's homogeneous poles.
-    fn collapse(&self, basis: &Basis, curve: &mut [[f64; 4]]) {
-        let n = self.v.count();
-        curve.fill([0.0; 4]);
-        for i in 0..=self.u.degree {
-            let share = basis.values[i];
-            let row = (basis.first + i) * n;
-            for (j, c) in curve.iter_mut().enumerate() {
-                let p = self.poles[row + j];
-                let w = self.weights.as_ref().map_or(1.0, |w| w[row + j]) * share;
-                *c = [c[0] + w * p[0], c[1] + w * p[1], c[2] + w * p[2], c[3] + w];
-            }
-        }
-    }
-
-    fn point(&self, basis: &Basis, curve: &[[f64; 4]]) -> Point {
-        let mut sum = [0.0; 4];
-        let poles = &curve[basis.first..=basis.first + self.v.degree];
-        for (&share, c) in basis.values.iter().zip(poles) {
-            sum = std::array::from_fn(|k| sum[k] + share * c[k]);
-        }
-        if self.weights.is_none() {
-            return [sum[0], sum[1], sum[2]];
-        }
-        [sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]]
+        Net::new(self).grid(us, vs)
     }
 }
 
