@@ -36,6 +36,8 @@ mod digitize;
 
 mod path;
 
+mod verify;
+
 mod record;
 
 pub use cutter::Cutter;
@@ -54,3 +56,4 @@ pub use row::{Outline, Row, RowKind};
 pub use surface::{Direction, MAX_DEGREE, Surface};
 pub use tolerance::MAX_COORDINATE;
 pub use vector::{Interval, Point, cross, dot, length, sub, unit};
+pub use verify::{Deviation, Excess, Gouge, INTERMEDIATE, Position, Scallop, Verification, verify};

@@ -1,0 +1,286 @@
+//! The cutter as a solid: how far a point is from it, along its normal and along the attack axis.
+//!
+//! Points come as seen from the cutter's centre, `[d, y, z]`: d along the spindle, y towards the
+//! cutter along the attack axis, z across. Both measures are convex functions of the point because
+//! the body is convex, so a tangent plane at any point bounds them from below everywhere; that is
+//! all a search needs. Written apart from `contact`, so that one can be held against the other, and
+//! for the torus without branches, so that a compiler can take several points at once.
+
+use crate::vector::Point;
+
+/// How much of the reach a tangent of the attack clearance keeps to: at its rim the slope is
+/// infinite.
+const RIM: f64 = 1.0 - 1.0e-6;
+
+/// Below this distance from a corner of the profile, relative to the cutter's size, the direction
+/// from the corner is rounding noise.
+const CORNER_NOISE: f64 = 1.0e-9;
+
+/// Keeps a quotient of lengths finite, mm; far below any of them.
+const TINY: f64 = 1.0e-100;
+
+/// A function that is nowhere greater than the one it touches: `value + slope · offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Plane {
+    /// At the point it was asked for, mm.
+    pub value: f64,
+    /// By d, y and z.
+    pub slope: Point,
+}
+
+/// A function of d and z that is nowhere less than the half chord `√(m(d)² − z²)`, which is concave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ChordPlane {
+    /// d and z of where the two touch.
+    pub at: [f64; 2],
+    /// The half chord there, mm.
+    pub value: f64,
+    /// Slopes by d and z.
+    pub slope: [f64; 2],
+}
+
+/// A cutter's body.
+pub(super) trait Solid: Sync {
+    /// Half the width along the spindle, mm.
+    fn half_width(&self) -> f64;
+    /// Largest radius, mm.
+    fn max_radius(&self) -> f64;
+    /// Normal clearance, mm: the signed distance from the point to the body, negative inside.
+    fn normal_clearance(&self, seen: Point) -> f64;
+    /// A tangent plane of the normal clearance.
+    fn normal_plane(&self, seen: Point) -> Plane;
+    /// Attack clearance, mm: how far the cutter can advance along the attack axis until it touches
+    /// the point, negative if it would have had to stop before; infinite if it never touches it.
+    fn attack_clearance(&self, seen: Point) -> f64;
+    /// A tangent plane of the half chord, at a point of the reach near the middle of an interval of
+    /// d, which meets the width, and one of z.
+    fn chord_plane(&self, d: [f64; 2], z: [f64; 2]) -> ChordPlane;
+}
+
+/// A torus wheel or a ball: a disc of radius R swept by a ball of radius r, so that the signed
+/// distance is the one to the disc, less r, and that inside the body too.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Torus {
+    /// R, mm.
+    pub major_radius: f64,
+    /// r, mm.
+    pub minor_radius: f64,
+}
+
+impl Solid for Torus {
+    fn half_width(&self) -> f64 {
+        self.minor_radius
+    }
+
+    fn max_radius(&self) -> f64 {
+        self.major_radius + self.minor_radius
+    }
+
+    #[inline(always)]
+    fn normal_clearance(&self, [d, y, z]: Point) -> f64 {
+        let beyond = positive((y * y + z * z).sqrt() - self.major_radius);
+        (d * d + beyond * beyond).sqrt() - self.minor_radius
+    }
+
+    #[inline(always)]
+    fn normal_plane(&self, [d, y, z]: Point) -> Plane {
+        let rho = (y * y + z * z).sqrt();
+        let beyond = positive(rho - self.major_radius);
+        let distance = (d * d + beyond * beyond).sqrt();
+        let rho = rho + TINY;
+        let scale = 1.0 / ((distance + TINY) * rho);
+        let across = beyond * scale;
+        Plane {
+            value: distance - self.minor_radius,
+            slope: [d * rho * scale, across * y, across * z],
+        }
+    }
+
+    #[inline(always)]
+    fn attack_clearance(&self, [d, y, z]: Point) -> f64 {
+        let r = self.minor_radius;
+        let square = r * r - d * d;
+        let m = self.major_radius + positive(square).sqrt();
+        let advance = -(y + positive((m - z) * (m + z)).sqrt());
+        if (square >= 0.0) & (z.abs() <= m) {
+            advance
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    #[inline(always)]
+    fn chord_plane(&self, d: [f64; 2], z: [f64; 2]) -> ChordPlane {
+        let at_d = within(0.5 * (d[0] + d[1]), RIM * self.minor_radius);
+        let root = ((self.minor_radius - at_d) * (self.minor_radius + at_d)).sqrt();
+        let m = self.major_radius + root;
+        let at_z = within(0.5 * (larger(z[0], -m) + smaller(z[1], m)), RIM * m);
+        let half = ((m - at_z) * (m + at_z)).sqrt();
+        let scale = 1.0 / (root * half);
+        ChordPlane {
+            at: [at_d, at_z],
+            value: half,
+            slope: [-at_d * m * scale, -at_z * root * scale],
+        }
+    }
+}
+
+/// A cone or cylinder, by its profile in the half plane of axial distance d and radius ρ.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cone {
+    half: f64,
+    radius: f64,
+    slope: f64,
+    /// 1/√(1 + slope²).
+    cos: f64,
+}
+
+/// What of the profile lies nearest.
+enum Nearest {
+    /// Its side, or the inside of the body.
+    Face,
+    /// An end.
+    End,
+    /// The corner of side and end, at d and ρ.
+    Corner(f64, f64),
+}
+
+impl Cone {
+    /// Of the radius in the middle of the width and the slope tan φ; lengths in mm.
+    pub fn new(radius: f64, width: f64, slope: f64) -> Self {
+        Self {
+            half: 0.5 * width,
+            radius,
+            slope,
+            cos: 1.0 / (1.0 + slope * slope).sqrt(),
+        }
+    }
+
+    /// Signed distance to the line of the side.
+    #[inline(always)]
+    fn side(&self, d: f64, rho: f64) -> f64 {
+        (rho - (self.radius + d * self.slope)) * self.cos
+    }
+
+    #[inline(always)]
+    fn nearest(&self, d: f64, rho: f64) -> Nearest {
+        let end = if self.side(d, rho) > 0.0 {
+            // Where the foot of the perpendicular falls on the side, from its middle.
+            let foot = d + self.slope * (rho - self.radius);
+            let limit = self.half * (1.0 + self.slope * self.slope);
+            if foot.abs() <= limit {
+                return Nearest::Face;
+            }
+            self.half.copysign(foot)
+        } else {
+            if d.abs() <= self.half {
+                return Nearest::Face;
+            }
+            self.half.copysign(d)
+        };
+        let corner = self.radius + end * self.slope;
+        if rho <= corner {
+            Nearest::End
+        } else {
+            Nearest::Corner(end, corner)
+        }
+    }
+}
+
+impl Solid for Cone {
+    fn half_width(&self) -> f64 {
+        self.half
+    }
+
+    fn max_radius(&self) -> f64 {
+        self.radius + self.slope.abs() * self.half
+    }
+
+    #[inline(always)]
+    fn normal_clearance(&self, [d, y, z]: Point) -> f64 {
+        let rho = (y * y + z * z).sqrt();
+        match self.nearest(d, rho) {
+            Nearest::Face => {
+                let side = self.side(d, rho);
+                if side > 0.0 {
+                    side
+                } else {
+                    side.max(d.abs() - self.half)
+                }
+            }
+            Nearest::End => d.abs() - self.half,
+            Nearest::Corner(x, r) => ((d - x) * (d - x) + (rho - r) * (rho - r)).sqrt(),
+        }
+    }
+
+    #[inline(always)]
+    fn normal_plane(&self, [d, y, z]: Point) -> Plane {
+        let rho = (y * y + z * z).sqrt();
+        let plane = |value: f64, by_d: f64, by_rho: f64| {
+            let across = by_rho / (rho + TINY);
+            Plane {
+                value,
+                slope: [by_d, across * y, across * z],
+            }
+        };
+        if let Nearest::Corner(x, r) = self.nearest(d, rho) {
+            let distance = ((d - x) * (d - x) + (rho - r) * (rho - r)).sqrt();
+            if distance > CORNER_NOISE * (self.half + self.radius) {
+                return plane(distance, (d - x) / distance, (rho - r) / distance);
+            }
+        }
+        // The body lies behind the planes of its side and its ends.
+        let (side, end) = (self.side(d, rho), d.abs() - self.half);
+        if side >= end {
+            plane(side, -self.slope * self.cos, self.cos)
+        } else {
+            plane(end, 1.0_f64.copysign(d), 0.0)
+        }
+    }
+
+    #[inline(always)]
+    fn attack_clearance(&self, [d, y, z]: Point) -> f64 {
+        let m = self.radius + d * self.slope;
+        if (d.abs() <= self.half) & (z.abs() <= m) {
+            -(y + positive((m - z) * (m + z)).sqrt())
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    #[inline(always)]
+    fn chord_plane(&self, d: [f64; 2], z: [f64; 2]) -> ChordPlane {
+        let at_d = within(0.5 * (d[0] + d[1]), RIM * self.half);
+        let m = self.radius + at_d * self.slope;
+        let at_z = within(0.5 * (larger(z[0], -m) + smaller(z[1], m)), RIM * m);
+        let half = ((m - at_z) * (m + at_z)).sqrt();
+        ChordPlane {
+            at: [at_d, at_z],
+            value: half,
+            slope: [m * self.slope / half, -at_z / half],
+        }
+    }
+}
+
+// One instruction each, where `f64::max` and `clamp` also deal with what is not a number.
+
+#[inline(always)]
+pub(super) fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+pub(super) fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn positive(a: f64) -> f64 {
+    larger(a, 0.0)
+}
+
+/// `a`, but no further from 0 than `limit`.
+#[inline(always)]
+fn within(a: f64, limit: f64) -> f64 {
+    smaller(larger(a, -limit), limit)
+}

@@ -1,0 +1,294 @@
+//! A hierarchy over the positions of a path: how it is built.
+//!
+//! Positions lie on a sheet: a height for each travel and angle. A tile of that sheet is its middle,
+//! its half extents in travel and angle, the plane fitted to its heights, and how far they stray from
+//! it. A node has up to eight tiles, each a node or a leaf of up to eight positions; both keep their
+//! numbers side by side, so that a search takes several at once. `search` is what it is for.
+
+use std::f64::consts::PI;
+
+/// Tiles of a node and positions of a leaf.
+pub(super) const WIDTH: usize = 8;
+
+/// A position to build from: travel (mm), angle (degrees), height (mm) and the number it goes by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Item {
+    pub x: f64,
+    pub angle: f64,
+    pub height: f64,
+    pub index: usize,
+}
+
+/// One number of each tile or position.
+pub(super) type Lanes = [f64; WIDTH];
+
+/// Where part and cutter stand at some positions, or in the middle of tiles. What there is none of
+/// is infinitely far away.
+#[derive(Debug, Clone)]
+pub(super) struct Stands {
+    pub x: Lanes,
+    pub cos: Lanes,
+    pub sin: Lanes,
+    pub height: Lanes,
+}
+
+/// Up to eight positions.
+#[derive(Debug, Clone)]
+pub(super) struct Leaf {
+    pub stands: Stands,
+    /// The numbers they go by.
+    pub index: [usize; WIDTH],
+}
+
+/// Up to eight tiles: x = middle ± `half_x`, angle = middle ± `half_angle` (radians), height =
+/// middle + `by_x`·Δx + `by_angle`·Δangle ± `residual`.
+#[derive(Debug, Clone)]
+pub(super) struct Node {
+    pub middle: Stands,
+    pub half_x: Lanes,
+    pub half_angle: Lanes,
+    pub by_x: Lanes,
+    pub by_angle: Lanes,
+    pub residual: Lanes,
+    pub children: [Child; WIDTH],
+}
+
+/// What a tile holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Child {
+    None,
+    Node(u32),
+    Leaf(u32),
+}
+
+/// Positions, made ready to be searched.
+#[derive(Debug)]
+pub(super) struct Hierarchy<S> {
+    pub body: S,
+    pub nodes: Vec<Node>,
+    pub leaves: Vec<Leaf>,
+    pub root: Child,
+    /// Greatest magnitude of the numbers that a bound is made of, but for the searched point's.
+    pub magnitude: f64,
+}
+
+impl<S: super::body::Solid> Hierarchy<S> {
+    /// Makes positions ready for a cutter's body; their numbers are finite and within bounds.
+    pub fn new(body: S, mut items: Vec<Item>) -> Self {
+        for item in &mut items {
+            item.angle = turn(item.angle);
+        }
+        let largest = |f: &dyn Fn(&Item) -> f64| items.iter().map(f).fold(0.0, f64::max);
+        let (x, height) = (largest(&|i| i.x.abs()), largest(&|i| i.height.abs()));
+        let lever = (height - body.max_radius()).max(body.half_width());
+        let mut builder = Builder {
+            lever,
+            nodes: Vec::new(),
+            leaves: Vec::with_capacity(items.len() / WIDTH + 1),
+        };
+        let root = builder.child(&mut items);
+        Self {
+            // A fitted plane rises by at most four times the range of the heights.
+            magnitude: x + 10.0 * height + body.max_radius() + body.half_width(),
+            body,
+            nodes: builder.nodes,
+            leaves: builder.leaves,
+            root,
+        }
+    }
+}
+
+/// An angle in degrees, however often unwound, as radians within one turn.
+pub(super) fn turn(degrees: f64) -> f64 {
+    // The remainder is exact, so the turns before lose nothing here.
+    let angle = (degrees % 360.0).to_radians();
+    if angle < 0.0 { angle + 2.0 * PI } else { angle }
+}
+
+struct Builder {
+    /// What turning by a radian moves, mm, as far as the choice of where to divide goes.
+    lever: f64,
+    nodes: Vec<Node>,
+    leaves: Vec<Leaf>,
+}
+
+impl Builder {
+    fn child(&mut self, items: &mut [Item]) -> Child {
+        if items.is_empty() {
+            return Child::None;
+        }
+        if items.len() <= WIDTH {
+            self.leaves.push(leaf(items));
+            return Child::Leaf(self.leaves.len() as u32 - 1);
+        }
+        let number = self.nodes.len();
+        self.nodes.push(EMPTY);
+        let mut parts = [Some(items), None, None, None, None, None, None, None];
+        // One becomes two, two become four, four become eight.
+        for count in [1, 2, 4] {
+            for k in (0..count).rev() {
+                if let Some(whole) = parts[k].take() {
+                    let (low, high) = self.divide(whole);
+                    parts[2 * k] = Some(low);
+                    parts[2 * k + 1] = Some(high);
+                }
+            }
+        }
+        for (k, part) in parts.into_iter().enumerate() {
+            let Some(part) = part.filter(|p| !p.is_empty()) else {
+                continue;
+            };
+            let tile = Tile::new(part);
+            let child = self.child(part);
+            self.nodes[number].set(k, &tile, child);
+        }
+        Child::Node(number as u32)
+    }
+
+    /// Divides items across their longest extent, into halves of whole leaves; the second is empty
+    /// if they fit into one.
+    fn divide<'a>(&self, items: &'a mut [Item]) -> (&'a mut [Item], &'a mut [Item]) {
+        let half = items.len().div_ceil(WIDTH).div_ceil(2) * WIDTH;
+        if half >= items.len() {
+            let end = items.len();
+            return items.split_at_mut(end);
+        }
+        let tile = Tile::new(items);
+        let extents = [tile.half_x, self.lever * tile.half_angle, tile.residual];
+        if extents[2] > extents[0].max(extents[1]) {
+            let off = |i: &Item| i.height - tile.by_x * i.x - tile.by_angle * i.angle;
+            items.select_nth_unstable_by(half, |a, b| off(a).total_cmp(&off(b)));
+        } else if extents[0] > extents[1] {
+            items.select_nth_unstable_by(half, |a, b| a.x.total_cmp(&b.x));
+        } else {
+            items.select_nth_unstable_by(half, |a, b| a.angle.total_cmp(&b.angle));
+        }
+        items.split_at_mut(half)
+    }
+}
+
+const NOWHERE: Stands = Stands {
+    x: [f64::INFINITY; WIDTH],
+    cos: [0.0; WIDTH],
+    sin: [0.0; WIDTH],
+    height: [0.0; WIDTH],
+};
+
+const EMPTY: Node = Node {
+    middle: NOWHERE,
+    half_x: [0.0; WIDTH],
+    half_angle: [0.0; WIDTH],
+    by_x: [0.0; WIDTH],
+    by_angle: [0.0; WIDTH],
+    residual: [0.0; WIDTH],
+    children: [Child::None; WIDTH],
+};
+
+impl Stands {
+    fn set(&mut self, k: usize, x: f64, angle: f64, height: f64) {
+        (self.sin[k], self.cos[k]) = libm::sincos(angle);
+        (self.x[k], self.height[k]) = (x, height);
+    }
+}
+
+impl Node {
+    fn set(&mut self, k: usize, tile: &Tile, child: Child) {
+        self.middle.set(k, tile.x, tile.angle, tile.height);
+        self.half_x[k] = tile.half_x;
+        self.half_angle[k] = tile.half_angle;
+        self.by_x[k] = tile.by_x;
+        self.by_angle[k] = tile.by_angle;
+        self.residual[k] = tile.residual;
+        self.children[k] = child;
+    }
+}
+
+fn leaf(items: &[Item]) -> Leaf {
+    let mut leaf = Leaf {
+        stands: NOWHERE,
+        index: [usize::MAX; WIDTH],
+    };
+    for (k, i) in items.iter().enumerate() {
+        leaf.stands.set(k, i.x, i.angle, i.height);
+        leaf.index[k] = i.index;
+    }
+    leaf
+}
+
+/// One tile of a [`Node`].
+struct Tile {
+    x: f64,
+    angle: f64,
+    height: f64,
+    half_x: f64,
+    half_angle: f64,
+    by_x: f64,
+    by_angle: f64,
+    residual: f64,
+}
+
+impl Tile {
+    /// The tile of items, which there are.
+    fn new(items: &[Item]) -> Self {
+        let mut ends = [[f64::MAX, f64::MIN]; 3];
+        for i in items {
+            let numbers = [i.x, i.angle, i.height];
+            ends =
+                std::array::from_fn(|k| [ends[k][0].min(numbers[k]), ends[k][1].max(numbers[k])]);
+        }
+        let [x, angle, height] = ends.map(|[low, high]| 0.5 * (low + high));
+        let [half_x, half_angle, half_height] = ends.map(|[low, high]| 0.5 * (high - low));
+        let (by_x, by_angle) = fit(items, x, angle, height)
+            .filter(|(a, b)| a.abs() * half_x + b.abs() * half_angle <= 8.0 * half_height)
+            .unwrap_or((0.0, 0.0));
+        let (mut low, mut high) = (f64::MAX, f64::MIN);
+        for i in items {
+            let off = i.height - by_x * (i.x - x) - by_angle * (i.angle - angle);
+            (low, high) = (low.min(off), high.max(off));
+        }
+        Self {
+            x,
+            angle,
+            height: 0.5 * (low + high),
+            half_x,
+            half_angle,
+            by_x,
+            by_angle,
+            residual: 0.5 * (high - low),
+        }
+    }
+}
+
+/// The slopes by travel and angle of the plane that fits the heights best, in the sense of least
+/// squares; any others would do, only less well. `None` if the items do not spread.
+fn fit(items: &[Item], x: f64, angle: f64, height: f64) -> Option<(f64, f64)> {
+    let n = items.len() as f64;
+    let mut sum = [0.0; 3];
+    let mut product = [0.0; 5];
+    for i in items {
+        let (a, b, h) = (i.x - x, i.angle - angle, i.height - height);
+        sum = [sum[0] + a, sum[1] + b, sum[2] + h];
+        let terms = [a * a, a * b, b * b, a * h, b * h];
+        product = std::array::from_fn(|k| product[k] + terms[k]);
+    }
+    let [a, b, h] = sum.map(|s| s / n);
+    let aa = product[0] - n * a * a;
+    let ab = product[1] - n * a * b;
+    let bb = product[2] - n * b * b;
+    let ah = product[3] - n * a * h;
+    let bh = product[4] - n * b * h;
+    let determinant = aa * bb - ab * ab;
+    if determinant > 1.0e-9 * aa * bb {
+        let by_x = (ah * bb - bh * ab) / determinant;
+        let by_angle = (bh * aa - ah * ab) / determinant;
+        return Some((by_x, by_angle));
+    }
+    // A row of positions along one direction, as in a ring or a line.
+    if bb > 0.0 && bb >= aa {
+        Some((0.0, bh / bb))
+    } else if aa > 0.0 {
+        Some((ah / aa, 0.0))
+    } else {
+        None
+    }
+}
