@@ -25,7 +25,7 @@ pub struct ToolPath {
 }
 
 impl ToolPath {
-    /// The same path by the numbers a machine is given, for [`crate::verify`].
+    /// The same path by the numbers a machine is given, for [`crate::verify()`].
     pub fn positions(&self) -> Vec<Position> {
         let position = |(index, touch): (u64, &Option<Touch>)| Position {
             x: self.trajectory.travel(index),

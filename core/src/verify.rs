@@ -14,10 +14,10 @@
 
 mod body;
 mod hierarchy;
-mod passes;
 mod sample;
 mod scallop;
 mod search;
+mod survey;
 
 use serde::{Deserialize, Serialize};
 
@@ -30,8 +30,8 @@ use crate::tolerance::MAX_COORDINATE;
 use crate::vector::Point;
 use body::{Cone, Solid, Torus};
 use hierarchy::{Hierarchy, Item};
-use passes::Worst;
 use sample::Samples;
+use survey::Worst;
 
 /// Poses checked on each straight move: at a quarter, the half and three quarters of it, the half
 /// being where a smooth motion strays most. What they can miss is a gouge that rises and falls between
@@ -174,29 +174,32 @@ fn verify_body<S: Solid + Copy>(
     let points = &samples.points;
     let items = items(positions);
     let standing = items.len() as u64;
-    let stood = passes::at_positions(&Hierarchy::new(body, items), points);
+    let moves = items.iter().filter(|i| i.by.is_some()).count() as u64;
+    let survey = survey::survey(&Hierarchy::new(body, items), points);
     let measured = match step {
-        Some(step) if standing > 0 => scallop::measured(samples, &stood.normal, step),
+        Some(step) if standing > 0 => scallop::measured(samples, &survey.normal, step),
         _ => None,
     };
-    let poses = poses(positions);
-    let moves = (poses.len() / INTERMEDIATE) as u64;
-    let motion = passes::between_positions(&Hierarchy::new(body, poses), points);
-
-    let reached: Vec<f64> = stood.attack.into_iter().flatten().collect();
+    let reached: Vec<f64> = survey.attack.into_iter().flatten().collect();
     let never = points.len() - reached.len();
-    let gouge = |worst: Worst, item: Item| Gouge {
-        depth: -worst.value,
-        point: points[worst.sample],
-        position: item.index as u64,
-        x: item.x,
-        angle: item.angle,
-        height: item.height,
+    let gouge = |worst: Worst, index: usize, share: f64| {
+        let [x, angle, height] = at(positions, index, share);
+        Gouge {
+            depth: -worst.value,
+            point: points[worst.sample],
+            position: index as u64,
+            x,
+            angle,
+            height,
+        }
     };
     let deviation = |measure: usize, excess: Vec<f64>| Deviation {
         excess: percentiles(excess),
-        gouge: stood.gouges[measure].map(|w| gouge(w, standing_at(positions, w.index))),
-        motion_gouge: motion[measure].map(|w| gouge(w, moving_at(positions, w.index))),
+        gouge: survey.gouges[measure].map(|w| gouge(w, w.index, 0.0)),
+        motion_gouge: survey.motion_gouges[measure].map(|w| {
+            let share = hierarchy::share(w.index % INTERMEDIATE);
+            gouge(w, w.index / INTERMEDIATE, share)
+        }),
     };
     Verification {
         samples: points.len() as u64,
@@ -204,7 +207,7 @@ fn verify_body<S: Solid + Copy>(
         positions: standing,
         moves,
         never_reached: never as f64 / points.len() as f64,
-        normal: deviation(0, stood.normal),
+        normal: deviation(0, survey.normal),
         attack: deviation(1, reached),
         scallop: Scallop {
             predicted: None,
@@ -243,50 +246,37 @@ fn check(positions: &[Position]) -> Result<()> {
     Ok(())
 }
 
-/// A position that is known to have a height.
-fn standing_at(positions: &[Position], index: usize) -> Item {
-    let Position { x, angle, height } = positions[index];
-    Item {
-        x,
-        angle,
-        height: height.unwrap_or(f64::NAN),
-        index,
-    }
-}
-
-/// An intermediate pose by its number; `index` of what it returns is the position it departs from.
-fn moving_at(positions: &[Position], number: usize) -> Item {
-    let (index, k) = (number / INTERMEDIATE, number % INTERMEDIATE);
-    let [from, to] = [index, index + 1].map(|i| standing_at(positions, i));
-    let share = (k + 1) as f64 / (INTERMEDIATE + 1) as f64;
-    let between = |a: f64, b: f64| a + (b - a) * share;
-    Item {
-        x: between(from.x, to.x),
-        angle: between(from.angle, to.angle),
-        height: between(from.height, to.height),
-        index,
-    }
-}
-
-/// The positions with a height, by index.
+/// The positions with a height, by index, each with its move if the next one has a height too.
 fn items(positions: &[Position]) -> Vec<Item> {
-    (0..positions.len())
-        .filter(|&i| positions[i].height.is_some())
-        .map(|i| standing_at(positions, i))
-        .collect()
+    let mut items = Vec::with_capacity(positions.len());
+    for (index, p) in positions.iter().enumerate() {
+        let Some(height) = p.height else { continue };
+        let next = positions.get(index + 1);
+        let by = next.and_then(|q| {
+            let turned = (q.angle - p.angle).to_radians();
+            q.height.map(|h| [q.x - p.x, turned, h - height])
+        });
+        items.push(Item {
+            index,
+            at: [p.x, hierarchy::turn(p.angle), height],
+            by,
+        });
+    }
+    items
 }
 
-/// The intermediate poses of all moves; number `INTERMEDIATE · i + k` is the k-th from position i.
-fn poses(positions: &[Position]) -> Vec<Item> {
-    let whole = |w: &[Position]| w[0].height.is_some() && w[1].height.is_some();
-    let departures = positions.windows(2).enumerate().filter(|(_, w)| whole(w));
-    departures
-        .flat_map(|(i, _)| INTERMEDIATE * i..INTERMEDIATE * (i + 1))
-        .map(|number| Item {
-            index: number,
-            ..moving_at(positions, number)
-        })
-        .collect()
+/// Travel (mm), angle (degrees, unwound) and height (mm) `share` of the way from a position with a
+/// height to the next.
+fn at(positions: &[Position], index: usize, share: f64) -> [f64; 3] {
+    let numbers = |p: &Position| [p.x, p.angle, p.height.unwrap_or(f64::NAN)];
+    let from = numbers(&positions[index]);
+    match positions.get(index + 1) {
+        Some(next) if share > 0.0 => {
+            let to = numbers(next);
+            std::array::from_fn(|k| from[k] + (to[k] - from[k]) * share)
+        }
+        _ => from,
+    }
 }
 
 fn percentiles(mut values: Vec<f64>) -> Option<Excess> {

@@ -2,21 +2,38 @@
 //!
 //! Positions lie on a sheet: a height for each travel and angle. A tile of that sheet is its middle,
 //! its half extents in travel and angle, the plane fitted to its heights, and how far they stray from
-//! it. A node has up to eight tiles, each a node or a leaf of up to eight positions; both keep their
-//! numbers side by side, so that a search takes several at once. `search` is what it is for.
+//! it. A node has up to eight tiles, each a node or a leaf of up to eight positions and
+//! the moves that depart from them; both keep their numbers side by side, so that a search takes several at once. `search` is what it is for.
 
 use std::f64::consts::PI;
+
+use super::INTERMEDIATE;
+use super::body::Solid;
 
 /// Tiles of a node and positions of a leaf.
 pub(super) const WIDTH: usize = 8;
 
-/// A position to build from: travel (mm), angle (degrees), height (mm) and the number it goes by.
+/// A position with the move that departs from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Item {
-    pub x: f64,
-    pub angle: f64,
-    pub height: f64,
+    /// The number it goes by.
     pub index: usize,
+    /// Travel (mm), angle (radians, within one turn) and height (mm).
+    pub at: [f64; 3],
+    /// What the move adds to them, if there is one.
+    pub by: Option<[f64; 3]>,
+}
+
+impl Item {
+    /// Travel, angle and height `share` of the way along the move.
+    pub fn along(&self, by: [f64; 3], share: f64) -> [f64; 3] {
+        std::array::from_fn(|k| self.at[k] + by[k] * share)
+    }
+
+    /// The ends of what it covers.
+    fn ends(&self) -> [[f64; 3]; 2] {
+        [self.at, self.by.map_or(self.at, |by| self.along(by, 1.0))]
+    }
 }
 
 /// One number of each tile or position.
@@ -32,11 +49,12 @@ pub(super) struct Stands {
     pub height: Lanes,
 }
 
-/// Up to eight positions.
+/// Up to eight positions, and the poses on the moves that depart from them.
 #[derive(Debug, Clone)]
 pub(super) struct Leaf {
-    pub stands: Stands,
-    /// The numbers they go by.
+    pub standing: Stands,
+    pub moving: [Stands; INTERMEDIATE],
+    /// The numbers that the positions go by.
     pub index: [usize; WIDTH],
 }
 
@@ -72,17 +90,17 @@ pub(super) struct Hierarchy<S> {
     pub magnitude: f64,
 }
 
-impl<S: super::body::Solid> Hierarchy<S> {
+impl<S: Solid> Hierarchy<S> {
     /// Makes positions ready for a cutter's body; their numbers are finite and within bounds.
     pub fn new(body: S, mut items: Vec<Item>) -> Self {
-        for item in &mut items {
-            item.angle = turn(item.angle);
+        let mut largest = [0.0_f64; 3];
+        for end in items.iter().flat_map(Item::ends) {
+            largest = std::array::from_fn(|k| largest[k].max(end[k].abs()));
         }
-        let largest = |f: &dyn Fn(&Item) -> f64| items.iter().map(f).fold(0.0, f64::max);
-        let (x, height) = (largest(&|i| i.x.abs()), largest(&|i| i.height.abs()));
-        let lever = (height - body.max_radius()).max(body.half_width());
+        let [x, _, height] = largest;
+        let heights: f64 = items.iter().map(|i| i.at[2].abs()).sum();
         let mut builder = Builder {
-            lever,
+            lever: lever(&body, heights / items.len().max(1) as f64),
             nodes: Vec::new(),
             leaves: Vec::with_capacity(items.len() / WIDTH + 1),
         };
@@ -98,6 +116,11 @@ impl<S: super::body::Solid> Hierarchy<S> {
     }
 }
 
+/// How far along a move its pose `k` is.
+pub(super) fn share(k: usize) -> f64 {
+    (k + 1) as f64 / (INTERMEDIATE + 1) as f64
+}
+
 /// An angle in degrees, however often unwound, as radians within one turn.
 pub(super) fn turn(degrees: f64) -> f64 {
     // The remainder is exact, so the turns before lose nothing here.
@@ -105,8 +128,18 @@ pub(super) fn turn(degrees: f64) -> f64 {
     if angle < 0.0 { angle + 2.0 * PI } else { angle }
 }
 
+/// The travel, mm, that raises a clearance as much as a turn by a radian does, so that tiles come out
+/// as long as wide where it matters. On a cylinder of radius a, whose wheel of radius m stands at a
+/// height h = a + m, a travel t away from the touch is worth t²/2w, w being the profile's radius of
+/// curvature, and a turn δ is worth a·h·δ²/2m.
+fn lever(body: &impl Solid, height: f64) -> f64 {
+    let (w, m) = (body.half_width(), body.max_radius());
+    let a = (height - m).max(w);
+    (w * a * height.max(w) / m).sqrt()
+}
+
 struct Builder {
-    /// What turning by a radian moves, mm, as far as the choice of where to divide goes.
+    /// How much travel, mm, is as much as a radian of turn.
     lever: f64,
     nodes: Vec<Node>,
     leaves: Vec<Leaf>,
@@ -154,14 +187,16 @@ impl Builder {
             return items.split_at_mut(end);
         }
         let tile = Tile::new(items);
+        let [by_x, by_angle] = [tile.by_x, tile.by_angle];
+        let by = |k: usize| move |a: &Item, b: &Item| a.at[k].total_cmp(&b.at[k]);
         let extents = [tile.half_x, self.lever * tile.half_angle, tile.residual];
         if extents[2] > extents[0].max(extents[1]) {
-            let off = |i: &Item| i.height - tile.by_x * i.x - tile.by_angle * i.angle;
+            let off = |i: &Item| i.at[2] - by_x * i.at[0] - by_angle * i.at[1];
             items.select_nth_unstable_by(half, |a, b| off(a).total_cmp(&off(b)));
         } else if extents[0] > extents[1] {
-            items.select_nth_unstable_by(half, |a, b| a.x.total_cmp(&b.x));
+            items.select_nth_unstable_by(half, by(0));
         } else {
-            items.select_nth_unstable_by(half, |a, b| a.angle.total_cmp(&b.angle));
+            items.select_nth_unstable_by(half, by(1));
         }
         items.split_at_mut(half)
     }
@@ -185,7 +220,7 @@ const EMPTY: Node = Node {
 };
 
 impl Stands {
-    fn set(&mut self, k: usize, x: f64, angle: f64, height: f64) {
+    fn set(&mut self, k: usize, [x, angle, height]: [f64; 3]) {
         (self.sin[k], self.cos[k]) = libm::sincos(angle);
         (self.x[k], self.height[k]) = (x, height);
     }
@@ -193,7 +228,7 @@ impl Stands {
 
 impl Node {
     fn set(&mut self, k: usize, tile: &Tile, child: Child) {
-        self.middle.set(k, tile.x, tile.angle, tile.height);
+        self.middle.set(k, [tile.x, tile.angle, tile.height]);
         self.half_x[k] = tile.half_x;
         self.half_angle[k] = tile.half_angle;
         self.by_x[k] = tile.by_x;
@@ -205,12 +240,17 @@ impl Node {
 
 fn leaf(items: &[Item]) -> Leaf {
     let mut leaf = Leaf {
-        stands: NOWHERE,
+        standing: NOWHERE,
+        moving: [NOWHERE; INTERMEDIATE],
         index: [usize::MAX; WIDTH],
     };
-    for (k, i) in items.iter().enumerate() {
-        leaf.stands.set(k, i.x, i.angle, i.height);
-        leaf.index[k] = i.index;
+    for (lane, item) in items.iter().enumerate() {
+        leaf.index[lane] = item.index;
+        leaf.standing.set(lane, item.at);
+        let Some(by) = item.by else { continue };
+        for (k, poses) in leaf.moving.iter_mut().enumerate() {
+            poses.set(lane, item.along(by, share(k)));
+        }
     }
     leaf
 }
@@ -231,10 +271,8 @@ impl Tile {
     /// The tile of items, which there are.
     fn new(items: &[Item]) -> Self {
         let mut ends = [[f64::MAX, f64::MIN]; 3];
-        for i in items {
-            let numbers = [i.x, i.angle, i.height];
-            ends =
-                std::array::from_fn(|k| [ends[k][0].min(numbers[k]), ends[k][1].max(numbers[k])]);
+        for end in items.iter().flat_map(Item::ends) {
+            ends = std::array::from_fn(|k| [ends[k][0].min(end[k]), ends[k][1].max(end[k])]);
         }
         let [x, angle, height] = ends.map(|[low, high]| 0.5 * (low + high));
         let [half_x, half_angle, half_height] = ends.map(|[low, high]| 0.5 * (high - low));
@@ -242,8 +280,9 @@ impl Tile {
             .filter(|(a, b)| a.abs() * half_x + b.abs() * half_angle <= 8.0 * half_height)
             .unwrap_or((0.0, 0.0));
         let (mut low, mut high) = (f64::MAX, f64::MIN);
-        for i in items {
-            let off = i.height - by_x * (i.x - x) - by_angle * (i.angle - angle);
+        // A move is straight, so its ends stray furthest.
+        for end in items.iter().flat_map(Item::ends) {
+            let off = end[2] - by_x * (end[0] - x) - by_angle * (end[1] - angle);
             (low, high) = (low.min(off), high.max(off));
         }
         Self {
@@ -266,7 +305,7 @@ fn fit(items: &[Item], x: f64, angle: f64, height: f64) -> Option<(f64, f64)> {
     let mut sum = [0.0; 3];
     let mut product = [0.0; 5];
     for i in items {
-        let (a, b, h) = (i.x - x, i.angle - angle, i.height - height);
+        let (a, b, h) = (i.at[0] - x, i.at[1] - angle, i.at[2] - height);
         sum = [sum[0] + a, sum[1] + b, sum[2] + h];
         let terms = [a * a, a * b, b * b, a * h, b * h];
         product = std::array::from_fn(|k| product[k] + terms[k]);

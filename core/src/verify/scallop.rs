@@ -8,7 +8,7 @@ use super::sample::Samples;
 use crate::cutter::Cutter;
 
 /// Sectors of a turn, and fewest samples of a tile, for [`measured`].
-const SECTORS: f64 = 12.0;
+const SECTORS: f64 = 36.0;
 const FEWEST: usize = 8;
 
 /// Height of the scallop, mm.
@@ -20,7 +20,7 @@ pub struct Scallop {
     /// wider than the cutter and successive turns do not meet.
     pub predicted: Option<f64>,
     /// As found on this part: the part is divided into tiles, each one step long (or four spacings,
-    /// if they are longer) in x and a 12th of a turn wide, and each body by itself; the largest
+    /// if they are longer) in x and a 36th of a turn wide, and each body by itself; the largest
     /// normal excess in each tile is one scallop, and this is their median. So neither hollows that
     /// the cutter cannot enter nor the steep ends of the part decide it. Nothing without a step, or
     /// if no tile holds 8 samples.

@@ -6,8 +6,9 @@
 //! size. The search opens the nearest tile first and skips none that could hold the least, so it
 //! equals going through all positions, bit for bit, ties included.
 
+use super::INTERMEDIATE;
 use super::body::{Plane, Solid, larger, smaller};
-use super::hierarchy::{Child, Hierarchy, Lanes, Leaf, Node, Stands, WIDTH};
+use super::hierarchy::{Child, Hierarchy, Lanes, Node, Stands, WIDTH};
 use crate::tolerance::{BOUND_SLACK, REACH_SLACK};
 use crate::vector::Point;
 
@@ -61,6 +62,28 @@ impl Clearance {
         normal: Least::below(f64::MAX),
         attack: Least::below(f64::MAX),
     };
+
+    #[inline(always)]
+    fn may_improve(&self, [normal, attack]: [f64; 2]) -> bool {
+        (normal <= self.normal.value) | (attack <= self.attack.value)
+    }
+}
+
+impl Found {
+    #[inline(always)]
+    fn may_improve(&self, bounds: [f64; 2]) -> bool {
+        self.standing.may_improve(bounds) | self.moving.may_improve(bounds)
+    }
+}
+
+/// What is found for a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Found {
+    /// Over all positions.
+    pub standing: Clearance,
+    /// Over the poses on all moves, of which pose k from position i goes by the number
+    /// `INTERMEDIATE · i + k`; only what is no greater than asked for.
+    pub moving: Clearance,
 }
 
 /// Tiles still to be opened, with what no position of theirs is below (mm, normal and attack);
@@ -76,44 +99,50 @@ struct Query {
 }
 
 impl<S: Solid> Hierarchy<S> {
-    /// The least clearances of the point (mm) that improve on `start`. The leaves where those of a
-    /// point nearby were found, `hint`, are where to look first, and change nothing else.
+    /// The least clearances of the point (mm) over the positions, and over the moves as far as they
+    /// are no greater than those of `moving`. The leaves where those of a point nearby were found,
+    /// `hint`, are where to look first, and change nothing else.
     pub fn least(
         &self,
         point: Point,
-        start: Clearance,
+        moving: Clearance,
         hint: &Clearance,
         stack: &mut Stack,
-    ) -> Clearance {
-        let mut best = start;
+    ) -> Found {
+        let mut best = Found {
+            standing: Clearance::NONE,
+            moving,
+        };
         let query = Query {
             point,
             radius: (point[1] * point[1] + point[2] * point[2]).sqrt(),
             slack: BOUND_SLACK
                 * (point[0].abs() + point[1].abs() + point[2].abs() + self.magnitude),
         };
-        if hint.normal.leaf < self.leaves.len() {
-            self.open(hint.normal.leaf, point, &mut best);
-        }
-        if hint.attack.leaf < self.leaves.len() && hint.attack.leaf != hint.normal.leaf {
-            self.open(hint.attack.leaf, point, &mut best);
+        let leaves = [hint.normal.leaf, hint.attack.leaf];
+        let distinct = if leaves[0] == leaves[1] { 1 } else { 2 };
+        for &number in &leaves[..distinct] {
+            if let Some(leaf) = self.leaves.get(number) {
+                let number_of = |lane: usize| leaf.index[lane];
+                self.offer(&leaf.standing, number, number_of, point, &mut best.standing);
+            }
         }
         stack.clear();
         stack.push(([f64::NEG_INFINITY; 2], self.root));
         while let Some((bounds, child)) = stack.pop() {
-            if !may_improve(bounds, &best) {
+            if !best.may_improve(bounds) {
                 continue;
             }
             match child {
                 Child::None => {}
-                Child::Leaf(leaf) => self.open(leaf as usize, point, &mut best),
+                Child::Leaf(number) => self.open(number as usize, bounds, point, &mut best),
                 Child::Node(number) => {
                     let node = &self.nodes[number as usize];
                     let [normal, attack] = self.bounds(node, &query);
                     let bottom = stack.len();
                     for k in 0..WIDTH {
                         let bounds = [normal[k], attack[k]];
-                        if node.children[k] != Child::None && may_improve(bounds, &best) {
+                        if node.children[k] != Child::None && best.may_improve(bounds) {
                             stack.push((bounds, node.children[k]));
                         }
                     }
@@ -124,19 +153,41 @@ impl<S: Solid> Hierarchy<S> {
         best
     }
 
-    /// Offers the positions of a leaf.
+    /// Offers the positions of a leaf, and the poses of its moves if its bounds make them worth it.
     #[inline(always)]
-    fn open(&self, number: usize, point: Point, best: &mut Clearance) {
-        let leaf: &Leaf = &self.leaves[number];
+    fn open(&self, number: usize, bounds: [f64; 2], point: Point, best: &mut Found) {
+        let leaf = &self.leaves[number];
+        if best.standing.may_improve(bounds) {
+            let number_of = |lane: usize| leaf.index[lane];
+            self.offer(&leaf.standing, number, number_of, point, &mut best.standing);
+        }
+        if best.moving.may_improve(bounds) {
+            for (k, poses) in leaf.moving.iter().enumerate() {
+                let number_of = |lane: usize| leaf.index[lane].wrapping_mul(INTERMEDIATE) + k;
+                self.offer(poses, number, number_of, point, &mut best.moving);
+            }
+        }
+    }
+
+    /// Offers what stands in the lanes of a leaf.
+    #[inline(always)]
+    fn offer(
+        &self,
+        stands: &Stands,
+        leaf: usize,
+        number_of: impl Fn(usize) -> usize,
+        point: Point,
+        best: &mut Clearance,
+    ) {
         let (mut normal, mut attack) = ([0.0; WIDTH], [0.0; WIDTH]);
         for k in 0..WIDTH {
-            let seen = seen(&leaf.stands, k, point);
+            let seen = seen(stands, k, point);
             normal[k] = self.body.normal_clearance(seen);
             attack[k] = self.body.attack_clearance(seen);
         }
         for k in 0..WIDTH {
-            best.normal.offer(normal[k], leaf.index[k], number);
-            best.attack.offer(attack[k], leaf.index[k], number);
+            best.normal.offer(normal[k], number_of(k), leaf);
+            best.attack.offer(attack[k], number_of(k), leaf);
         }
     }
 
@@ -235,11 +286,6 @@ fn seen(stands: &Stands, k: usize, p: Point) -> Point {
         (p[1] * stands.cos[k] - p[2] * stands.sin[k]) - stands.height[k],
         p[1] * stands.sin[k] + p[2] * stands.cos[k],
     ]
-}
-
-#[inline(always)]
-fn may_improve([normal, attack]: [f64; 2], best: &Clearance) -> bool {
-    normal <= best.normal.value || attack <= best.attack.value
 }
 
 /// Puts what is nearest along the normal where it is popped first.
