@@ -10,7 +10,7 @@
 //!
 //! Between samples, `spacing` apart, a gouge can be deeper than reported by up to about `spacing² / 2`
 //! times the difference of the curvatures of cutter and part: 16 µm for 0.5 mm and a radius of 8 mm.
-//! Memory: about 80 bytes a sample and, at the most, 110 × [`INTERMEDIATE`] bytes a position.
+//! Memory: about 80 bytes a sample and 210 bytes a position.
 
 mod body;
 mod hierarchy;

@@ -284,3 +284,134 @@ fn positive(a: f64) -> f64 {
 fn within(a: f64, limit: f64) -> f64 {
     smaller(larger(a, -limit), limit)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A body with its profile as a function, for sampling.
+    type Shaped = (Box<dyn Solid>, Box<dyn Fn(f64) -> f64>);
+
+    fn bodies() -> Vec<Shaped> {
+        let torus = |major_radius: f64, minor_radius: f64| -> Shaped {
+            let body = Torus {
+                major_radius,
+                minor_radius,
+            };
+            let m =
+                move |d: f64| major_radius + positive(minor_radius * minor_radius - d * d).sqrt();
+            (Box::new(body), Box::new(m))
+        };
+        let cone = |radius: f64, width: f64, slope: f64| -> Shaped {
+            let m = move |d: f64| radius + d * slope;
+            (Box::new(Cone::new(radius, width, slope)), Box::new(m))
+        };
+        vec![
+            torus(40.0, 8.0),
+            torus(0.0, 10.0),
+            torus(3.0, 12.0),
+            cone(20.0, 12.0, 0.0),
+            cone(5.0, 30.0, 0.0),
+            cone(20.0, 12.0, 1.7),
+            cone(20.0, 12.0, -0.6),
+            cone(10.0, 20.0, 1.0),
+            cone(10.0, 20.0, -1.0),
+        ]
+    }
+
+    /// The distance in the half plane to densely sampled points of side and ends, negative inside.
+    fn sampled(body: &dyn Solid, m: &dyn Fn(f64) -> f64, d: f64, rho: f64) -> f64 {
+        let (w, n) = (body.half_width(), 4000);
+        let mut least = f64::INFINITY;
+        for i in 0..=n {
+            let share = f64::from(i) / f64::from(n);
+            // Denser towards the ends, where a torus is steep.
+            let x = -w * libm::cos(std::f64::consts::PI * share);
+            least = least.min((d - x).hypot(rho - m(x)));
+            for end in [-w, w] {
+                least = least.min((d - end).hypot(rho - share * m(end)));
+            }
+        }
+        let inside = d.abs() <= w && rho <= m(d);
+        if inside { -least } else { least }
+    }
+
+    #[test]
+    fn the_signed_distance_is_that_of_the_sampled_boundary() {
+        for (number, (body, m)) in bodies().into_iter().enumerate() {
+            for i in -24..=24 {
+                for j in 0..=24 {
+                    let (d, rho) = (f64::from(i) * 1.3, f64::from(j) * 2.9);
+                    let expected = sampled(body.as_ref(), &m, d, rho);
+                    // Whichever way it points from the axis.
+                    for [y, z] in [[rho, 0.0], [-0.6 * rho, 0.8 * rho]] {
+                        let found = body.normal_clearance([d, y, z]);
+                        assert!(
+                            (found - expected).abs() < 2e-3,
+                            "body {number} at {d}, {rho}: {found}, but {expected} sampled"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    fn anywhere() -> impl Strategy<Value = Point> {
+        prop_oneof![
+            prop::array::uniform3(-60.0..60.0_f64),
+            prop::array::uniform3(-12..12_i32).prop_map(|p| p.map(|c| f64::from(c) * 5.0)),
+            // At and about the axis, the rims and the discs.
+            (-3..3_i32, -3..3_i32).prop_map(|(d, y)| [
+                f64::from(d) * 6.0,
+                f64::from(y) * 20.0,
+                0.0
+            ]),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(3000))]
+
+        #[test]
+        fn tangents_are_below_the_clearances_everywhere(
+            number in 0..9_usize,
+            at in anywhere(),
+            other in anywhere(),
+            half in 0.0..20.0_f64,
+        ) {
+            let (body, _) = bodies().swap_remove(number);
+            let Plane { value, slope } = body.normal_plane(at);
+            let offset: f64 = (0..3).map(|k| slope[k] * (other[k] - at[k])).sum();
+            prop_assert!((value - body.normal_clearance(at)).abs() < 1e-9);
+            prop_assert!(value + offset <= body.normal_clearance(other) + 1e-9);
+
+            let advance = body.attack_clearance(other);
+            let w = body.half_width();
+            let reach = [(at[0] - half).max(-w), (at[0] + half).min(w)];
+            if advance < f64::INFINITY && reach[0] <= reach[1] {
+                let chord = body.chord_plane(reach, [at[2] - half, at[2] + half]);
+                let above = chord.value
+                    + chord.slope[0] * (other[0] - chord.at[0])
+                    + chord.slope[1] * (other[2] - chord.at[1]);
+                let steep = chord.slope[0].abs() + chord.slope[1].abs();
+                prop_assert!(-other[1] - above <= advance + 1e-9 * (1.0 + steep));
+            }
+        }
+    }
+
+    /// The two measures agree where the cutter comes at a point straight on, and are far apart
+    /// behind it.
+    #[test]
+    fn clearances_have_the_sign_of_the_side_they_are_seen_from() {
+        let torus = Torus {
+            major_radius: 40.0,
+            minor_radius: 8.0,
+        };
+        let both = |p| [torus.normal_clearance(p), torus.attack_clearance(p)];
+        assert_eq!(both([0.0, -50.0, 0.0]), [2.0, 2.0]);
+        assert_eq!(both([0.0, -47.0, 0.0]), [-1.0, -1.0]);
+        assert_eq!(both([0.0, 50.0, 0.0]), [2.0, -98.0]);
+        assert_eq!(both([9.0, -40.0, 0.0]), [1.0, f64::INFINITY]);
+    }
+}

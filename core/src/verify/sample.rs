@@ -46,17 +46,21 @@ pub(super) struct Samples {
 /// [`Error::OutOfBounds`] for a spacing that is not positive, [`Error::TooManySamples`].
 pub(super) fn sample(part: &Part, spacing: Option<f64>) -> Result<Samples> {
     let nets: Vec<Net> = part.bodies.iter().map(|b| Net::new(&b.shape)).collect();
-    let area: f64 = nets.iter().map(Net::area).sum();
+    let [area, line, count] = nets.iter().fold([0.0; 3], |sum, net| {
+        let size = net.size();
+        std::array::from_fn(|k| sum[k] + size[k])
+    });
     let spacing = match spacing {
         Some(s) => {
             let ok = s > 0.0 && s.is_finite();
             bounded("spacing", s, ok, "greater than 0 mm and finite")?;
             s
         }
-        None if area > 0.0 => (area / DEFAULT_SAMPLES).sqrt(),
+        // Where there is next to no area, its lines are what counts.
+        None if area > 0.0 => (area / DEFAULT_SAMPLES).sqrt().max(line / DEFAULT_SAMPLES),
         None => 1.0,
     };
-    let expected = nets.iter().map(|n| n.expected(spacing)).sum();
+    let expected = area / (spacing * spacing) + line / spacing + count;
     if expected > MAX_SAMPLES {
         return Err(Error::TooManySamples {
             samples: expected,
@@ -83,6 +87,7 @@ pub(super) fn sample(part: &Part, spacing: Option<f64>) -> Result<Samples> {
 /// A body, measured.
 enum Net<'a> {
     Surface(SurfaceNet<'a>),
+    /// With its area, mm².
     Mesh(&'a Mesh, f64),
 }
 
@@ -94,23 +99,15 @@ impl<'a> Net<'a> {
         }
     }
 
-    /// About its area, mm², counted as often as rows of even spacing pass over it.
-    fn area(&self) -> f64 {
-        match self {
-            Self::Surface(net) => net.area,
-            Self::Mesh(_, area) => *area,
-        }
-    }
-
-    /// About how many samples it takes.
-    fn expected(&self, spacing: f64) -> f64 {
-        let inside = self.area() / (spacing * spacing);
+    /// What asks for samples: an area (mm²), counted as often as rows of even spacing pass over it;
+    /// lines (mm) that are sampled in any case; and points likewise.
+    fn size(&self) -> [f64; 3] {
         match self {
             Self::Surface(net) => {
-                let rows = net.u.total() / spacing + net.u.forced.len() as f64;
-                inside + (net.widest / spacing) * net.u.forced.len() as f64 + rows * 8.0
+                let (u, v) = (net.u.forced.len() as f64, net.forced_v.len() as f64);
+                [net.area, u * net.widest + v * net.u.total(), u * v]
             }
-            Self::Mesh(mesh, _) => inside + mesh.vertices().len() as f64,
+            Self::Mesh(mesh, area) => [*area, 0.0, mesh.vertices().len() as f64],
         }
     }
 }
@@ -289,5 +286,127 @@ fn sample_mesh(mesh: &Mesh, spacing: f64, points: &mut Vec<Point>) {
             };
             points.push(add_scaled(add_scaled(a, s, sub(b, a)), t, sub(c, a)));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::part::Body;
+    use crate::surface::tests::quarter_cylinder;
+
+    fn part(shapes: Vec<Shape>) -> Part {
+        let body = |shape| Body {
+            name: "body".to_owned(),
+            shape,
+        };
+        Part {
+            bodies: shapes.into_iter().map(body).collect(),
+        }
+    }
+
+    fn square() -> Mesh {
+        let corners = [
+            [0.0, 0.0],
+            [30.0, 0.0],
+            [30.0, 20.0],
+            [0.0, 20.0],
+            [99.0, 99.0],
+        ];
+        let vertices = corners.map(|[x, y]| [x, y, 5.0]).to_vec();
+        Mesh::new("square", vertices, vec![[0, 1, 2], [0, 2, 3]]).expect("valid")
+    }
+
+    /// How far the worst of many places on the quarter cylinder is from the next sample.
+    fn gap(points: &[Point]) -> f64 {
+        let mut worst = 0.0_f64;
+        for i in 0..=60 {
+            for j in 0..=40 {
+                let angle = std::f64::consts::FRAC_PI_2 * f64::from(j) / 40.0;
+                let p = [
+                    f64::from(i) * 0.5,
+                    10.0 * libm::cos(angle),
+                    10.0 * libm::sin(angle),
+                ];
+                let near = points.iter().map(|&q| length(sub(p, q)));
+                worst = worst.max(near.fold(f64::INFINITY, f64::min));
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn a_surface_is_covered_to_its_boundary() {
+        for transposed in [false, true] {
+            let surface = quarter_cylinder(10.0, 30.0);
+            let surface = if transposed {
+                surface.transposed()
+            } else {
+                surface
+            };
+            let part = part(vec![Shape::Surface(surface)]);
+            let samples = sample(&part, Some(1.0)).expect("valid");
+            let area = 30.0 * 5.0 * std::f64::consts::PI;
+            let count = samples.points.len() as f64;
+            assert!(
+                count > area && count < 1.4 * area,
+                "{count} over {area} mm²"
+            );
+            assert!(gap(&samples.points) < 1.0, "{}", gap(&samples.points));
+            let near = |p: Point| samples.points.iter().any(|&q| length(sub(p, q)) < 1e-12);
+            for corner in [
+                [0.0, 10.0, 0.0],
+                [30.0, 10.0, 0.0],
+                [0.0, 0.0, 10.0],
+                [30.0, 0.0, 10.0],
+            ] {
+                assert!(near(corner), "{corner:?}");
+            }
+            // At irregular offsets: hardly two rows at the same distance.
+            let mut xs: Vec<f64> = samples.points.iter().map(|p| p[0]).collect();
+            xs.sort_by(f64::total_cmp);
+            xs.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
+            let mut steps: Vec<f64> = xs.windows(2).map(|w| w[1] - w[0]).collect();
+            steps.sort_by(f64::total_cmp);
+            assert!(steps[steps.len() - 2] > 1.2 * steps[2], "{steps:?}");
+        }
+    }
+
+    #[test]
+    fn the_default_is_so_many_samples_whatever_the_size() {
+        for scale in [0.1, 1.0, 1000.0] {
+            let part = part(vec![Shape::Surface(quarter_cylinder(
+                10.0 * scale,
+                30.0 * scale,
+            ))]);
+            let count = sample(&part, None).expect("valid").points.len();
+            assert!((200_000..300_000).contains(&count), "{count}");
+        }
+    }
+
+    #[test]
+    fn a_mesh_is_sampled_by_area_and_at_the_vertices_it_uses() {
+        let part = part(vec![Shape::Mesh(square()), Shape::Mesh(square())]);
+        let samples = sample(&part, Some(1.0)).expect("valid");
+        let [first, second] = [samples.ends[0], samples.ends[1] - samples.ends[0]];
+        assert_eq!((first, second), (604, 604));
+        assert_eq!(samples.points.len(), 1208);
+        assert!(samples.points.contains(&[30.0, 20.0, 5.0]));
+        assert!(!samples.points.contains(&[99.0, 99.0, 5.0]));
+        let on = |p: &Point| (0.0..=30.0).contains(&p[0]) && (0.0..=20.0).contains(&p[1]);
+        assert!(samples.points.iter().all(on));
+        let quarter = samples.points[..first]
+            .iter()
+            .filter(|p| p[0] < 15.0 && p[1] < 10.0);
+        let count = quarter.count();
+        assert!((140..=162).contains(&count), "{count}");
+    }
+
+    #[test]
+    fn a_surface_without_extent_still_has_its_ends() {
+        let part = part(vec![Shape::Surface(quarter_cylinder(10.0, 0.0))]);
+        let count = |spacing| sample(&part, spacing).expect("valid").points.len();
+        assert!(count(None) > 0);
+        assert!(count(Some(1.0)) >= 2 * 16);
     }
 }
