@@ -3,40 +3,41 @@
 //! Points come as seen from the cutter's centre, `[d, y, z]`: d along the spindle, y towards the
 //! cutter along the attack axis, z across. Both measures are convex functions of the point because
 //! the body is convex, so a tangent plane at any point bounds them from below everywhere; that is
-//! all a search needs. Written apart from `contact`, so that one can be held against the other, and
-//! for the torus without branches, so that a compiler can take several points at once.
+//! all a search needs. Clearances are what is reported and doubles; tangents only bound, and are
+//! singles. Written apart from `contact`, so that one can be held against the other, and for the
+//! torus without branches, so that a compiler can take several points at once.
 
 use crate::vector::Point;
 
 /// How much of the reach a tangent of the attack clearance keeps to: at its rim the slope is
 /// infinite.
-const RIM: f64 = 1.0 - 1.0e-6;
+const RIM: f32 = 1.0 - 1.0e-4;
 
 /// Below this distance from a corner of the profile, relative to the cutter's size, the direction
 /// from the corner is rounding noise.
 const CORNER_NOISE: f64 = 1.0e-9;
 
-/// Keeps a quotient of lengths finite, mm; far below any of them.
-const TINY: f64 = 1.0e-100;
+/// Keeps a quotient of lengths finite, mm; far below any of them, and its square a normal single.
+const TINY: f32 = 1.0e-15;
 
 /// A function that is nowhere greater than the one it touches: `value + slope · offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Plane {
     /// At the point it was asked for, mm.
-    pub value: f64,
+    pub value: f32,
     /// By d, y and z.
-    pub slope: Point,
+    pub slope: [f32; 3],
 }
 
 /// A function of d and z that is nowhere less than the half chord `√(m(d)² − z²)`, which is concave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ChordPlane {
     /// d and z of where the two touch.
-    pub at: [f64; 2],
+    pub at: [f32; 2],
     /// The half chord there, mm.
-    pub value: f64,
+    pub value: f32,
     /// Slopes by d and z.
-    pub slope: [f64; 2],
+    pub slope: [f32; 2],
 }
 
 /// A cutter's body.
@@ -48,13 +49,13 @@ pub(super) trait Solid: Sync {
     /// Normal clearance, mm: the signed distance from the point to the body, negative inside.
     fn normal_clearance(&self, seen: Point) -> f64;
     /// A tangent plane of the normal clearance.
-    fn normal_plane(&self, seen: Point) -> Plane;
+    fn normal_plane(&self, seen: [f32; 3]) -> Plane;
     /// Attack clearance, mm: how far the cutter can advance along the attack axis until it touches
     /// the point, negative if it would have had to stop before; infinite if it never touches it.
     fn attack_clearance(&self, seen: Point) -> f64;
     /// A tangent plane of the half chord, at a point of the reach near the middle of an interval of
     /// d, which meets the width, and one of z.
-    fn chord_plane(&self, d: [f64; 2], z: [f64; 2]) -> ChordPlane;
+    fn chord_plane(&self, d: [f32; 2], z: [f32; 2]) -> ChordPlane;
 }
 
 /// A torus wheel or a ball: a disc of radius R swept by a ball of radius r, so that the signed
@@ -83,15 +84,15 @@ impl Solid for Torus {
     }
 
     #[inline(always)]
-    fn normal_plane(&self, [d, y, z]: Point) -> Plane {
+    fn normal_plane(&self, [d, y, z]: [f32; 3]) -> Plane {
         let rho = (y * y + z * z).sqrt();
-        let beyond = positive(rho - self.major_radius);
+        let beyond = positive(rho - self.major_radius as f32);
         let distance = (d * d + beyond * beyond).sqrt();
         let rho = rho + TINY;
         let scale = 1.0 / ((distance + TINY) * rho);
         let across = beyond * scale;
         Plane {
-            value: distance - self.minor_radius,
+            value: distance - self.minor_radius as f32,
             slope: [d * rho * scale, across * y, across * z],
         }
     }
@@ -110,10 +111,11 @@ impl Solid for Torus {
     }
 
     #[inline(always)]
-    fn chord_plane(&self, d: [f64; 2], z: [f64; 2]) -> ChordPlane {
-        let at_d = within(0.5 * (d[0] + d[1]), RIM * self.minor_radius);
-        let root = ((self.minor_radius - at_d) * (self.minor_radius + at_d)).sqrt();
-        let m = self.major_radius + root;
+    fn chord_plane(&self, d: [f32; 2], z: [f32; 2]) -> ChordPlane {
+        let r = self.minor_radius as f32;
+        let at_d = within(0.5 * (d[0] + d[1]), RIM * r);
+        let root = ((r - at_d) * (r + at_d)).sqrt();
+        let m = self.major_radius as f32 + root;
         let at_z = within(0.5 * (larger(z[0], -m) + smaller(z[1], m)), RIM * m);
         let half = ((m - at_z) * (m + at_z)).sqrt();
         let scale = 1.0 / (root * half);
@@ -214,15 +216,16 @@ impl Solid for Cone {
     }
 
     #[inline(always)]
-    fn normal_plane(&self, [d, y, z]: Point) -> Plane {
-        let rho = (y * y + z * z).sqrt();
+    fn normal_plane(&self, [d, y, z]: [f32; 3]) -> Plane {
+        let length = (y * y + z * z).sqrt();
         let plane = |value: f64, by_d: f64, by_rho: f64| {
-            let across = by_rho / (rho + TINY);
+            let across = by_rho as f32 / (length + TINY);
             Plane {
-                value,
-                slope: [by_d, across * y, across * z],
+                value: value as f32,
+                slope: [by_d as f32, across * y, across * z],
             }
         };
+        let (d, rho) = (f64::from(d), f64::from(length));
         if let Nearest::Corner(x, r) = self.nearest(d, rho) {
             let distance = ((d - x) * (d - x) + (rho - r) * (rho - r)).sqrt();
             if distance > CORNER_NOISE * (self.half + self.radius) {
@@ -249,39 +252,40 @@ impl Solid for Cone {
     }
 
     #[inline(always)]
-    fn chord_plane(&self, d: [f64; 2], z: [f64; 2]) -> ChordPlane {
-        let at_d = within(0.5 * (d[0] + d[1]), RIM * self.half);
-        let m = self.radius + at_d * self.slope;
+    fn chord_plane(&self, d: [f32; 2], z: [f32; 2]) -> ChordPlane {
+        let slope = self.slope as f32;
+        let at_d = within(0.5 * (d[0] + d[1]), RIM * self.half as f32);
+        let m = self.radius as f32 + at_d * slope;
         let at_z = within(0.5 * (larger(z[0], -m) + smaller(z[1], m)), RIM * m);
         let half = ((m - at_z) * (m + at_z)).sqrt();
         ChordPlane {
             at: [at_d, at_z],
             value: half,
-            slope: [m * self.slope / half, -at_z / half],
+            slope: [m * slope / half, -at_z / half],
         }
     }
 }
 
-// One instruction each, where `f64::max` and `clamp` also deal with what is not a number.
+// One instruction each, where `max`, `min` and `clamp` also deal with what is not a number.
 
 #[inline(always)]
-pub(super) fn larger(a: f64, b: f64) -> f64 {
+pub(super) fn larger<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }
 
 #[inline(always)]
-pub(super) fn smaller(a: f64, b: f64) -> f64 {
+pub(super) fn smaller<T: PartialOrd>(a: T, b: T) -> T {
     if a < b { a } else { b }
 }
 
 #[inline(always)]
-fn positive(a: f64) -> f64 {
-    larger(a, 0.0)
+fn positive<T: PartialOrd + Default>(a: T) -> T {
+    larger(a, T::default())
 }
 
 /// `a`, but no further from 0 than `limit`.
 #[inline(always)]
-fn within(a: f64, limit: f64) -> f64 {
+fn within(a: f32, limit: f32) -> f32 {
     smaller(larger(a, -limit), limit)
 }
 
@@ -289,6 +293,9 @@ fn within(a: f64, limit: f64) -> f64 {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// What singles may be off by at these lengths, mm; a search allows for several times that.
+    const SINGLE: f64 = 1.0e-4;
 
     /// A body with its profile as a function, for sampling.
     type Shaped = (Box<dyn Solid>, Box<dyn Fn(f64) -> f64>);
@@ -381,21 +388,23 @@ mod tests {
             half in 0.0..20.0_f64,
         ) {
             let (body, _) = bodies().swap_remove(number);
-            let Plane { value, slope } = body.normal_plane(at);
-            let offset: f64 = (0..3).map(|k| slope[k] * (other[k] - at[k])).sum();
-            prop_assert!((value - body.normal_clearance(at)).abs() < 1e-9);
-            prop_assert!(value + offset <= body.normal_clearance(other) + 1e-9);
+            let Plane { value, slope } = body.normal_plane(at.map(|c| c as f32));
+            let offset: f64 = (0..3).map(|k| f64::from(slope[k]) * (other[k] - at[k])).sum();
+            prop_assert!((f64::from(value) - body.normal_clearance(at)).abs() < SINGLE);
+            prop_assert!(f64::from(value) + offset <= body.normal_clearance(other) + SINGLE);
 
             let advance = body.attack_clearance(other);
             let w = body.half_width();
             let reach = [(at[0] - half).max(-w), (at[0] + half).min(w)];
             if advance < f64::INFINITY && reach[0] <= reach[1] {
-                let chord = body.chord_plane(reach, [at[2] - half, at[2] + half]);
-                let above = chord.value
-                    + chord.slope[0] * (other[0] - chord.at[0])
-                    + chord.slope[1] * (other[2] - chord.at[1]);
-                let steep = chord.slope[0].abs() + chord.slope[1].abs();
-                prop_assert!(-other[1] - above <= advance + 1e-9 * (1.0 + steep));
+                let z = [at[2] - half, at[2] + half];
+                let chord = body.chord_plane(reach.map(|c| c as f32), z.map(|c| c as f32));
+                let [slope, at] = [chord.slope, chord.at].map(|p| p.map(f64::from));
+                let above = f64::from(chord.value)
+                    + slope[0] * (other[0] - at[0])
+                    + slope[1] * (other[2] - at[1]);
+                let steep = slope[0].abs() + slope[1].abs();
+                prop_assert!(-other[1] - above <= advance + SINGLE * (1.0 + steep));
             }
         }
     }

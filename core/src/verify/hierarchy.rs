@@ -36,24 +36,24 @@ impl Item {
     }
 }
 
-/// One number of each tile or position.
-pub(super) type Lanes = [f64; WIDTH];
+/// One number of each tile; singles, for they only decide where to look.
+pub(super) type Lanes = [f32; WIDTH];
 
-/// Where part and cutter stand at some positions, or in the middle of tiles. What there is none of
-/// is infinitely far away.
+/// Where part and cutter stand at some positions, or in the middle of tiles. Positions that there are
+/// none of are infinitely far away.
 #[derive(Debug, Clone)]
-pub(super) struct Stands {
-    pub x: Lanes,
-    pub cos: Lanes,
-    pub sin: Lanes,
-    pub height: Lanes,
+pub(super) struct Stands<T> {
+    pub x: [T; WIDTH],
+    pub cos: [T; WIDTH],
+    pub sin: [T; WIDTH],
+    pub height: [T; WIDTH],
 }
 
 /// Up to eight positions, and the poses on the moves that depart from them.
 #[derive(Debug, Clone)]
 pub(super) struct Leaf {
-    pub standing: Stands,
-    pub moving: [Stands; INTERMEDIATE],
+    pub standing: Stands<f64>,
+    pub moving: [Stands<f64>; INTERMEDIATE],
     /// The numbers that the positions go by.
     pub index: [usize; WIDTH],
 }
@@ -62,7 +62,7 @@ pub(super) struct Leaf {
 /// middle + `by_x`·Δx + `by_angle`·Δangle ± `residual`.
 #[derive(Debug, Clone)]
 pub(super) struct Node {
-    pub middle: Stands,
+    pub middle: Stands<f32>,
     pub half_x: Lanes,
     pub half_angle: Lanes,
     pub by_x: Lanes,
@@ -106,8 +106,8 @@ impl<S: Solid> Hierarchy<S> {
         };
         let root = builder.child(&mut items);
         Self {
-            // A fitted plane rises by at most four times the range of the heights.
-            magnitude: x + 10.0 * height + body.max_radius() + body.half_width(),
+            // A fitted plane rises by at most twice as much as the heights it is fitted to.
+            magnitude: x + 3.0 * height + body.max_radius() + body.half_width(),
             body,
             nodes: builder.nodes,
             leaves: builder.leaves,
@@ -202,7 +202,7 @@ impl Builder {
     }
 }
 
-const NOWHERE: Stands = Stands {
+const NOWHERE: Stands<f64> = Stands {
     x: [f64::INFINITY; WIDTH],
     cos: [0.0; WIDTH],
     sin: [0.0; WIDTH],
@@ -210,7 +210,12 @@ const NOWHERE: Stands = Stands {
 };
 
 const EMPTY: Node = Node {
-    middle: NOWHERE,
+    middle: Stands {
+        x: [0.0; WIDTH],
+        cos: [0.0; WIDTH],
+        sin: [0.0; WIDTH],
+        height: [0.0; WIDTH],
+    },
     half_x: [0.0; WIDTH],
     half_angle: [0.0; WIDTH],
     by_x: [0.0; WIDTH],
@@ -219,7 +224,7 @@ const EMPTY: Node = Node {
     children: [Child::None; WIDTH],
 };
 
-impl Stands {
+impl Stands<f64> {
     fn set(&mut self, k: usize, [x, angle, height]: [f64; 3]) {
         (self.sin[k], self.cos[k]) = libm::sincos(angle);
         (self.x[k], self.height[k]) = (x, height);
@@ -228,12 +233,15 @@ impl Stands {
 
 impl Node {
     fn set(&mut self, k: usize, tile: &Tile, child: Child) {
-        self.middle.set(k, [tile.x, tile.angle, tile.height]);
-        self.half_x[k] = tile.half_x;
-        self.half_angle[k] = tile.half_angle;
-        self.by_x[k] = tile.by_x;
-        self.by_angle[k] = tile.by_angle;
-        self.residual[k] = tile.residual;
+        let (sin, cos) = libm::sincos(tile.angle);
+        let middle = &mut self.middle;
+        (middle.x[k], middle.height[k]) = (tile.x as f32, tile.height as f32);
+        (middle.sin[k], middle.cos[k]) = (sin as f32, cos as f32);
+        self.half_x[k] = tile.half_x as f32;
+        self.half_angle[k] = tile.half_angle as f32;
+        self.by_x[k] = tile.by_x as f32;
+        self.by_angle[k] = tile.by_angle as f32;
+        self.residual[k] = tile.residual as f32;
         self.children[k] = child;
     }
 }
@@ -254,6 +262,9 @@ fn leaf(items: &[Item]) -> Leaf {
     }
     leaf
 }
+
+/// Steepest plane that is fitted, mm per millimetre or per radian.
+const STEEPEST: f64 = 1.0e9;
 
 /// One tile of a [`Node`].
 struct Tile {
@@ -277,7 +288,9 @@ impl Tile {
         let [x, angle, height] = ends.map(|[low, high]| 0.5 * (low + high));
         let [half_x, half_angle, half_height] = ends.map(|[low, high]| 0.5 * (high - low));
         let (by_x, by_angle) = fit(items, x, angle, height)
-            .filter(|(a, b)| a.abs() * half_x + b.abs() * half_angle <= 8.0 * half_height)
+            // A plane so steep that singles lose it is no better than none.
+            .filter(|(a, b)| a.abs().max(b.abs()) < STEEPEST)
+            .filter(|(a, b)| a.abs() * half_x + b.abs() * half_angle <= 2.0 * half_height)
             .unwrap_or((0.0, 0.0));
         let (mut low, mut high) = (f64::MAX, f64::MIN);
         // A move is straight, so its ends stray furthest.

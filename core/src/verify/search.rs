@@ -6,10 +6,11 @@
 //! size. The search opens the nearest tile first and skips none that could hold the least, so it
 //! equals going through all positions, bit for bit, ties included.
 
+use std::ops::{Add, Mul, Sub};
+
 use super::INTERMEDIATE;
 use super::body::{Plane, Solid, larger, smaller};
 use super::hierarchy::{Child, Hierarchy, Lanes, Node, Stands, WIDTH};
-use crate::tolerance::{BOUND_SLACK, REACH_SLACK};
 use crate::vector::Point;
 
 /// The least clearance found, and where.
@@ -64,14 +65,16 @@ impl Clearance {
     };
 
     #[inline(always)]
-    fn may_improve(&self, [normal, attack]: [f64; 2]) -> bool {
-        (normal <= self.normal.value) | (attack <= self.attack.value)
+    fn may_improve(&self, bounds: [f32; 2]) -> bool {
+        let [normal, attack] = bounds.map(f64::from);
+        // What is not a number does not exclude anything.
+        !((normal > self.normal.value) & (attack > self.attack.value))
     }
 }
 
 impl Found {
     #[inline(always)]
-    fn may_improve(&self, bounds: [f64; 2]) -> bool {
+    fn may_improve(&self, bounds: [f32; 2]) -> bool {
         self.standing.may_improve(bounds) | self.moving.may_improve(bounds)
     }
 }
@@ -88,15 +91,20 @@ pub(super) struct Found {
 
 /// Tiles still to be opened, with what no position of theirs is below (mm, normal and attack);
 /// reused from search to search.
-pub(super) type Stack = Vec<([f64; 2], Child)>;
+pub(super) type Stack = Vec<([f32; 2], Child)>;
 
 /// A point to search for.
 struct Query {
-    point: Point,
+    point: [f32; 3],
     /// Distance from the spindle axis, mm.
-    radius: f64,
-    slack: f64,
+    radius: f32,
+    /// What rounding can make of a bound, mm.
+    slack: f32,
 }
+
+/// Rounding of a bound relative to the greatest of its numbers: about 45 operations in singles, each
+/// off by 2⁻²⁴ at the most, and some room.
+const ROUNDING: f64 = 64.0 / 16_777_216.0;
 
 impl<S: Solid> Hierarchy<S> {
     /// The least clearances of the point (mm) over the positions, and over the moves as far as they
@@ -113,11 +121,11 @@ impl<S: Solid> Hierarchy<S> {
             standing: Clearance::NONE,
             moving,
         };
+        let magnitude = point[0].abs() + point[1].abs() + point[2].abs() + self.magnitude;
         let query = Query {
-            point,
-            radius: (point[1] * point[1] + point[2] * point[2]).sqrt(),
-            slack: BOUND_SLACK
-                * (point[0].abs() + point[1].abs() + point[2].abs() + self.magnitude),
+            point: point.map(|c| c as f32),
+            radius: (point[1] * point[1] + point[2] * point[2]).sqrt() as f32,
+            slack: (ROUNDING * magnitude) as f32,
         };
         let leaves = [hint.normal.leaf, hint.attack.leaf];
         let distinct = if leaves[0] == leaves[1] { 1 } else { 2 };
@@ -128,7 +136,7 @@ impl<S: Solid> Hierarchy<S> {
             }
         }
         stack.clear();
-        stack.push(([f64::NEG_INFINITY; 2], self.root));
+        stack.push(([f32::NEG_INFINITY; 2], self.root));
         while let Some((bounds, child)) = stack.pop() {
             if !best.may_improve(bounds) {
                 continue;
@@ -155,7 +163,7 @@ impl<S: Solid> Hierarchy<S> {
 
     /// Offers the positions of a leaf, and the poses of its moves if its bounds make them worth it.
     #[inline(always)]
-    fn open(&self, number: usize, bounds: [f64; 2], point: Point, best: &mut Found) {
+    fn open(&self, number: usize, bounds: [f32; 2], point: Point, best: &mut Found) {
         let leaf = &self.leaves[number];
         if best.standing.may_improve(bounds) {
             let number_of = |lane: usize| leaf.index[lane];
@@ -173,7 +181,7 @@ impl<S: Solid> Hierarchy<S> {
     #[inline(always)]
     fn offer(
         &self,
-        stands: &Stands,
+        stands: &Stands<f64>,
         leaf: usize,
         number_of: impl Fn(usize) -> usize,
         point: Point,
@@ -205,7 +213,7 @@ impl<S: Solid> Hierarchy<S> {
     }
 
     #[inline(always)]
-    fn normal_bound(&self, node: &Node, k: usize, query: &Query, seen: Point) -> f64 {
+    fn normal_bound(&self, node: &Node, k: usize, query: &Query, seen: [f32; 3]) -> f32 {
         let Plane { value, slope } = self.body.normal_plane(seen);
         let turned = [seen[1] + node.middle.height[k], seen[2]];
         let turn = Turn::new(turned, [slope[1], slope[2]], node.half_angle[k]);
@@ -220,12 +228,12 @@ impl<S: Solid> Hierarchy<S> {
     }
 
     #[inline(always)]
-    fn attack_bound(&self, node: &Node, k: usize, query: &Query, seen: Point) -> f64 {
+    fn attack_bound(&self, node: &Node, k: usize, query: &Query, seen: [f32; 3]) -> f32 {
         let [d, y, z] = seen;
         let (half_x, half_angle) = (node.half_x[k], node.half_angle[k]);
-        let slack = REACH_SLACK + query.slack;
-        let w = self.body.half_width() + slack;
-        let m = self.body.max_radius() + slack;
+        let slack = query.slack;
+        let w = self.body.half_width() as f32 + slack;
+        let m = self.body.max_radius() as f32 + slack;
         let reach = [larger(d - half_x, -w), smaller(d + half_x, w)];
         let turned = [y + node.middle.height[k], z];
         let swing = turned[0].abs() * half_angle + 0.5 * query.radius * half_angle * half_angle;
@@ -247,7 +255,7 @@ impl<S: Solid> Hierarchy<S> {
             - turn.curl
             - (1.0 + steep) * slack;
         if (reach[0] > reach[1]) | (z - swing > m) | (z + swing < -m) {
-            f64::INFINITY
+            f32::INFINITY
         } else {
             bound
         }
@@ -258,16 +266,16 @@ impl<S: Solid> Hierarchy<S> {
 /// it: turned it is off by `sin δ (−z, y) − (1 − cos δ)(y, z)`.
 struct Turn {
     /// The function's slope by the angle.
-    by_angle: f64,
+    by_angle: f32,
     /// How much less than that slope says the function can be, with `|sin δ − δ| ≤ δ³/6` and
     /// `0 ≤ 1 − cos δ ≤ δ²/2`. On the side of the part that faces the cutter the latter only takes
     /// the point away from it.
-    curl: f64,
+    curl: f32,
 }
 
 impl Turn {
     #[inline(always)]
-    fn new([y, z]: [f64; 2], slope: [f64; 2], half_angle: f64) -> Self {
+    fn new([y, z]: [f32; 2], slope: [f32; 2], half_angle: f32) -> Self {
         let by_angle = slope[1] * y - slope[0] * z;
         let inwards = larger(slope[0] * y + slope[1] * z, 0.0);
         let square = half_angle * half_angle;
@@ -280,7 +288,10 @@ impl Turn {
 
 /// A part point seen from the cutter's centre.
 #[inline(always)]
-fn seen(stands: &Stands, k: usize, p: Point) -> Point {
+fn seen<T>(stands: &Stands<T>, k: usize, p: [T; 3]) -> [T; 3]
+where
+    T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>,
+{
     [
         p[0] - stands.x[k],
         (p[1] * stands.cos[k] - p[2] * stands.sin[k]) - stands.height[k],
@@ -290,7 +301,7 @@ fn seen(stands: &Stands, k: usize, p: Point) -> Point {
 
 /// Puts what is nearest along the normal where it is popped first.
 #[inline(always)]
-fn nearest_last(tiles: &mut [([f64; 2], Child)]) {
+fn nearest_last(tiles: &mut [([f32; 2], Child)]) {
     for i in 1..tiles.len() {
         let mut k = i;
         while k > 0 && tiles[k - 1].0[0] < tiles[k].0[0] {
