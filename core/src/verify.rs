@@ -138,10 +138,6 @@ pub fn verify(
     }
     check(positions)?;
     let samples = sample::sample(part, spacing)?;
-    let scallop = Scallop {
-        predicted: step.and_then(|s| scallop::predicted(cutter, s)),
-        measured: None,
-    };
     let mut verification = match *cutter {
         Cutter::Torus {
             major_radius,
@@ -160,7 +156,7 @@ pub fn verify(
             ..
         } => verify_body(Cone::new(radius, width, slope), &samples, step, positions),
     };
-    verification.scallop.predicted = scallop.predicted;
+    verification.scallop.predicted = step.and_then(|s| scallop::predicted(cutter, s));
     Ok(verification)
 }
 

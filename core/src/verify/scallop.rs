@@ -70,3 +70,26 @@ pub(super) fn measured(samples: &Samples, excess: &[f64], step: f64) -> Option<f
     largest.sort_unstable_by(f64::total_cmp);
     largest.get(largest.len().saturating_sub(1) / 2).copied()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_prediction_follows_the_profile() {
+        let of = |cutter: crate::Result<Cutter>, step| predicted(&cutter.expect("valid"), step);
+        let known = |found: Option<f64>, expected: f64| {
+            assert!(
+                (found.expect("known") - expected).abs() < 1e-12,
+                "{found:?}"
+            );
+        };
+        known(of(Cutter::torus(40.0, 8.0), 2.0), 8.0 - 63.0_f64.sqrt());
+        known(of(Cutter::ball(8.0), 16.0), 8.0);
+        known(of(Cutter::cylinder(30.0, 10.0), 10.0), 0.0);
+        known(of(Cutter::cone(30.0, 10.0, 45.0), 4.0), 4.0);
+        known(of(Cutter::cone(30.0, 10.0, -45.0), 4.0), 4.0);
+        assert_eq!(of(Cutter::ball(8.0), 16.1), None);
+        assert_eq!(of(Cutter::cylinder(30.0, 10.0), 10.1), None);
+    }
+}
