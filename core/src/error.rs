@@ -172,6 +172,30 @@ pub enum Error {
         /// Deviation asked for, mm.
         tolerance: f64,
     },
+    /// A position of a path that cannot be one.
+    #[error("position {index} has a {quantity} of {value}, but must have one {bound}")]
+    BadPosition {
+        /// The position, from 0.
+        index: usize,
+        /// `travel`, `angle` or `height`.
+        quantity: &'static str,
+        /// The number as found.
+        value: f64,
+        /// What would have been accepted.
+        bound: &'static str,
+    },
+    /// Samples of a part so close that there would be too many.
+    #[error(
+        "samples {spacing} mm apart would be {samples:.3e}, more than the {limit:.1e} that a part can have; ask for a wider spacing"
+    )]
+    TooManySamples {
+        /// Samples that it would take.
+        samples: f64,
+        /// Spacing asked for, mm.
+        spacing: f64,
+        /// Most samples.
+        limit: f64,
+    },
     /// Stitching found positions that nobody delivered.
     #[error("positions {first} to {last} are missing from the path")]
     Gap {
@@ -206,6 +230,7 @@ impl Error {
             Self::OutOfMemory { .. }
                 | Self::ToleranceNotReached { .. }
                 | Self::TooManyPositions { .. }
+                | Self::TooManySamples { .. }
                 | Self::GridTooLarge { .. }
                 | Self::EmptyTravel { .. }
         )

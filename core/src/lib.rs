@@ -45,6 +45,8 @@ mod digitize;
 
 mod path;
 
+mod verify;
+
 mod record;
 
 pub use cutter::Cutter;
@@ -64,3 +66,4 @@ pub use simd::Simd;
 pub use surface::{Direction, MAX_DEGREE, Surface};
 pub use tolerance::MAX_COORDINATE;
 pub use vector::{Interval, Point, cross, dot, length, sub, unit};
+pub use verify::{Deviation, Excess, Gouge, INTERMEDIATE, Position, Scallop, Verification, verify};

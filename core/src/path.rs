@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::motion::Trajectory;
 use crate::vector::Point;
+use crate::verify::Position;
 
 /// Where the cutter touches the part at one position.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +22,18 @@ pub struct ToolPath {
     pub trajectory: Trajectory,
     /// One for each position, in order.
     pub touches: Vec<Option<Touch>>,
+}
+
+impl ToolPath {
+    /// The same path by the numbers a machine is given, for [`crate::verify()`].
+    pub fn positions(&self) -> Vec<Position> {
+        let position = |(index, touch): (u64, &Option<Touch>)| Position {
+            x: self.trajectory.travel(index),
+            angle: self.trajectory.angle(index),
+            height: touch.map(|t| t.height),
+        };
+        (0..).zip(&self.touches).map(position).collect()
+    }
 }
 
 /// A run of consecutive positions, digitized.
