@@ -117,9 +117,29 @@ pub(crate) struct Job {
         help_heading = "Instead of the job file's"
     )]
     pub contact: Option<String>,
-    /// How the touch is searched: exact or brute
+    /// How the touch is searched: exact, brute or local
     #[arg(long, env = "HORMA_METHOD", help_heading = "Instead of the job file's")]
     pub method: Option<String>,
+    /// Rows around the last winner that the local search looks at: fewer than this away
+    #[arg(
+        long,
+        value_name = "ROWS",
+        env = "HORMA_DELTA_U",
+        help_heading = "Instead of the job file's"
+    )]
+    pub delta_u: Option<u32>,
+    /// Columns around the last winner that the local search looks at
+    #[arg(
+        long,
+        value_name = "COLUMNS",
+        env = "HORMA_DELTA_V",
+        help_heading = "Instead of the job file's"
+    )]
+    pub delta_v: Option<u32>,
+    /// Leave the local search as the papers have it: where the window has lost the winner the path is
+    /// wrong; the report says where and by how much
+    #[arg(long, help_heading = "Instead of the job file's")]
+    pub no_fallback: bool,
     /// Chordal tolerance of surfaces, mm
     #[arg(
         long,
@@ -195,6 +215,9 @@ impl Job {
             distribution: self.distribution.clone(),
             contact: self.contact.clone(),
             method: self.method.clone(),
+            delta_u: self.delta_u,
+            delta_v: self.delta_v,
+            fallback: self.no_fallback.then_some(false),
             tolerance: self.tolerance,
             step: self.step,
             points_per_revolution: self.points_per_revolution,

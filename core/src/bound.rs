@@ -136,7 +136,9 @@ impl Lids {
     /// Puts a snug lid around points into a lane.
     pub fn set(&mut self, lane: usize, frame: &Frame, points: &[Point]) {
         let origin = [frame.origin, 0.0, 0.0];
-        let axes = axes(points);
+        // A few points tell the axes and the curvature well; that the lid holds all is for the rest.
+        let some = || points.iter().copied().step_by(points.len().div_ceil(FIT));
+        let axes = axes(some());
         let mut ranges = [Interval::EMPTY; 3];
         for &p in points {
             for (range, &axis) in ranges.iter_mut().zip(&axes) {
@@ -156,7 +158,7 @@ impl Lids {
             let (s, t) = (dot(r, axes[0]) * inverse[0], dot(r, axes[1]) * inverse[1]);
             (s * s, t * t, dot(r, axes[2]), r)
         };
-        let (a, b) = paraboloid(points.iter().map(|&p| {
+        let (a, b) = paraboloid(some().map(|p| {
             let (s, t, w, _) = local(p);
             (s, t, w)
         }));
@@ -187,6 +189,9 @@ impl Lids {
     }
 }
 
+/// Points that a lid is fitted to.
+const FIT: usize = 64;
+
 /// The curvatures a and b of the paraboloid `w₀ − a·s² − b·t²` that fits points `(s², t², w)` best.
 fn paraboloid(points: impl Iterator<Item = (f64, f64, f64)>) -> (f64, f64) {
     let mut n = Matrix3::zeros();
@@ -205,16 +210,16 @@ fn paraboloid(points: impl Iterator<Item = (f64, f64, f64)>) -> (f64, f64) {
 
 /// Axes that fit points: a direction that leans towards the spindle, one that is square to the spindle,
 /// and the normal, away from the spindle.
-fn axes(points: &[Point]) -> [Point; 3] {
+fn axes(points: impl Iterator<Item = Point> + Clone) -> [Point; 3] {
     let (mut count, mut sum) = (0.0, [0.0; 3]);
-    for &p in points {
+    for p in points.clone() {
         count += 1.0;
         sum = add_scaled(sum, 1.0, p);
     }
     let mean = sum.map(|s| s / count);
     // Second moments, as the six numbers of a symmetric matrix.
     let mut m = [0.0; 6];
-    for &p in points {
+    for p in points {
         let [x, y, z] = sub(p, mean);
         m = [
             m[0] + x * x,
