@@ -51,6 +51,8 @@ pub(crate) enum Command {
     Run(Run),
     /// Send a job to a running master, and fetch its path
     Submit(Submit),
+    /// Hold a path against the designed surface: gouges, excess, scallops
+    Verify(Verify),
     /// Serve as a master: workers register, clients submit jobs
     Master(Master),
     /// Serve as a worker of a master
@@ -90,6 +92,28 @@ pub(crate) struct Run {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct Verify {
+    /// The path: the columns of a path.csv; the contact may be empty
+    #[arg(value_name = "PATH.csv")]
+    pub path: PathBuf,
+    /// The job file (TOML): its part, cutter and step
+    #[arg(value_name = "JOB")]
+    pub job: PathBuf,
+    /// Deepest gouge allowed, normal to the surface, mm [default: the job's chordal tolerance]
+    #[arg(long, value_name = "MM")]
+    pub tolerance: Option<f64>,
+    /// Distance between samples of the surface, mm [default: such that there are about 240000]
+    #[arg(long, value_name = "MM")]
+    pub spacing: Option<f64>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Threads [default: all cores]
+    #[arg(long, value_name = "N", env = "HORMA_THREADS", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct Submit {
     #[command(flatten)]
     pub job: Job,
@@ -110,6 +134,10 @@ pub(crate) struct Job {
     /// Show nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
+    /// Do not hold the path against the designed surface; a gouge deeper than the tolerance then goes
+    /// unnoticed
+    #[arg(long)]
+    pub no_verify: bool,
     /// What the cutter touches: facet or point
     #[arg(
         long,

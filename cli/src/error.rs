@@ -41,6 +41,17 @@ pub(crate) enum Error {
     JobFailed { address: String, reason: String },
     #[error("the master at {address} sent a path that cannot be right: {reason}")]
     BadReply { address: String, reason: String },
+    #[error("the path gouges the part by {depth:.4} mm, more than the tolerance of {tolerance} mm, at [{:.3}, {:.3}, {:.3}] of the part (position {position}: travel {x:.3}, angle {angle:.2}°); digitize facets (contact = \"facet\") to a finer tolerance, or skip the verification with --no-verify", point[0], point[1], point[2])]
+    Gouge {
+        depth: f64,
+        tolerance: f64,
+        point: [f64; 3],
+        position: u64,
+        x: f64,
+        angle: f64,
+    },
+    #[error("{what}, which takes one process; use `horma run` without workers")]
+    OneProcess { what: &'static str },
     #[error("cannot start threads: {0}")]
     Threads(String),
     #[error("interrupted")]
@@ -54,13 +65,16 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Core(e) | Self::Formats(horma_formats::Error::Core(e)) => of_core(e),
-            Self::Formats(horma_formats::Error::NoContact { .. }) | Self::Impossible { .. } => 3,
+            Self::Formats(horma_formats::Error::NoContact { .. })
+            | Self::Impossible { .. }
+            | Self::Gouge { .. } => 3,
             Self::Master(horma_master::Error::Plan(e)) => of_core(e),
             Self::Formats(_)
             | Self::Bind { .. }
             | Self::Exposed { .. }
             | Self::Address { .. }
             | Self::Refused { .. }
+            | Self::OneProcess { .. }
             | Self::Worker(horma_worker::Error::Address { .. }) => 2,
             Self::Master(_)
             | Self::Worker(_)

@@ -1,7 +1,8 @@
 //! The papers' heuristic: Algorithm 2 of the 2001 paper, windows around the last winners.
 //!
 //! On each surface only the points less than δu rows and δv columns from its last winner are looked at,
-//! wrapping round in v; the search starts with all points. The winner may leave the window unnoticed, so
+//! wrapping round in v; once a surface comes within the cutter's width the search starts with all its
+//! points. The winner may leave the window unnoticed, so
 //! that the method is not exact by itself: `digitize` holds it against the hierarchy. Nothing is bounded
 //! here.
 
@@ -19,7 +20,7 @@ use crate::record::Counters;
 use crate::row::{Row, RowKind};
 use crate::sweep::Sweep;
 use crate::tree::{Start, Tree};
-use crate::vector::{Point, cross, dot, sub};
+use crate::vector::{Interval, Point, cross, dot, length, sub};
 
 /// The grids of the surfaces that rows belong to.
 #[derive(Debug)]
@@ -35,10 +36,10 @@ struct Grid {
     start: usize,
     rows: usize,
     columns: usize,
-    /// Whether the last column is the first one again.
+    /// Whether its rows go all the way round.
     closed: bool,
-    /// Travel of each row's first point, mm.
-    x: Vec<f64>,
+    /// Extent along the spindle, mm.
+    x: Interval,
 }
 
 /// The last winner of each grid, as row and column.
@@ -59,8 +60,8 @@ impl Grids {
                     start,
                     rows: run.len(),
                     columns,
-                    closed: columns > 2 && run.iter().all(|r| r.points[0] == r.points[columns - 1]),
-                    x: run.iter().map(|r| r.points[0][0]).collect(),
+                    closed: goes_round(run),
+                    x: Interval::of(run.iter().flat_map(|r| &r.points).map(|p| p[0])),
                 });
             }
             if culling.back_faces {
@@ -91,6 +92,12 @@ impl Grids {
     ) -> u64 {
         let mut evaluated = 0;
         for (grid, winner) in self.grids.iter().zip(winners) {
+            let reach = Interval::of([pose.x]).widened(cutter.half_width());
+            if !grid.x.meets(reach) {
+                // Nothing to touch; once there is, all of it is searched again.
+                *winner = None;
+                continue;
+            }
             let mut own = Best::above(f64::NEG_INFINITY);
             match *winner {
                 None => {
@@ -112,9 +119,8 @@ impl Grids {
             if let Some(touch) = own.touch() {
                 best.raise(touch, own.id);
                 *winner = Some(grid.place(own.id));
-            } else if let Some((row, _)) = winner {
-                // Nothing of the window is in reach: it follows the cutter along the spindle.
-                *row = grid.row_at(pose.x);
+            } else {
+                *winner = None;
             }
         }
         evaluated
@@ -215,26 +221,16 @@ impl Grid {
         (row, (id & u64::from(u32::MAX)) as usize)
     }
 
-    /// The row nearest to a travel.
-    fn row_at(&self, x: f64) -> usize {
-        let away = |&i: &usize, &j: &usize| (self.x[i] - x).abs().total_cmp(&(self.x[j] - x).abs());
-        (0..self.rows).min_by(away).unwrap_or_default()
-    }
-
     /// The columns less than `delta` from a column: one range, or two where they wrap round.
     fn columns_around(&self, column: usize, delta: u32) -> [Range<usize>; 2] {
         let reach = delta as usize - 1;
-        // The last column of a closed grid is its first one.
-        let period = self.columns - 1;
-        if !self.closed || reach * 2 >= period {
-            let all = if self.closed {
-                0..self.columns
-            } else {
-                around(column, delta, self.columns)
-            };
-            return [all, 0..0];
+        let period = self.columns;
+        if !self.closed {
+            return [around(column, delta, period), 0..0];
         }
-        let column = column % period;
+        if 2 * reach + 1 >= period {
+            return [0..period, 0..0];
+        }
         if column < reach {
             [0..column + reach + 1, period + column - reach..period]
         } else if column + reach >= period {
@@ -243,6 +239,19 @@ impl Grid {
             [column - reach..column + reach + 1, 0..0]
         }
     }
+}
+
+/// Whether the ends of the rows are no further apart than two columns are on average: real surfaces meet
+/// themselves at a seam that has a gap of its own.
+fn goes_round(run: &[Row]) -> bool {
+    let apart = |a: Point, b: Point| length(sub(b, a));
+    let (mut gap, mut spacing) = (0.0, 0.0);
+    for Row { points, .. } in run {
+        let around: f64 = points.windows(2).map(|pair| apart(pair[0], pair[1])).sum();
+        spacing += around / points.len() as f64;
+        gap += apart(points[points.len() - 1], points[0]);
+    }
+    run[0].points.len() > 3 && gap <= spacing
 }
 
 /// The indices below `count` that are less than `delta` from `index`.
@@ -295,7 +304,7 @@ mod tests {
             rows: 5,
             columns,
             closed,
-            x: vec![0.0, 1.0, 2.0, 3.0, 4.0],
+            x: Interval::EMPTY,
         }
     }
 
@@ -308,11 +317,10 @@ mod tests {
         assert_eq!(columns(false, 5, 2), [4, 5, 6]);
         assert_eq!(columns(false, 0, 3), [0, 1, 2]);
         assert_eq!(columns(false, 10, 2), [9, 10]);
-        assert_eq!(columns(true, 0, 3), [0, 1, 2, 8, 9]);
-        assert_eq!(columns(true, 10, 2), [0, 1, 9], "column 10 is column 0");
-        assert_eq!(columns(true, 9, 2), [8, 9, 0]);
+        assert_eq!(columns(true, 0, 3), [0, 1, 2, 9, 10]);
+        assert_eq!(columns(true, 10, 2), [9, 10, 0]);
+        assert_eq!(columns(true, 5, 2), [4, 5, 6]);
         assert_eq!(columns(true, 3, 50).len(), 11);
         assert_eq!(around(3, 1, 5), 3..4);
-        assert_eq!(grid(3, false).row_at(2.4), 2);
     }
 }
