@@ -354,11 +354,12 @@ pub(crate) fn lid_bounds<S: Simd>(
     let by_w = dot3(slope, normal);
     let outward = by_w.max(0.0);
     let along_u = rise(
+        simd,
         dot3(slope, u).abs(),
         outward * f32x8::from_slice(simd, &lids.a),
     );
     let by_v = (slope[1] * vy + slope[2] * vz).abs();
-    let along_v = rise(by_v, outward * f32x8::from_slice(simd, &lids.b));
+    let along_v = rise(simd, by_v, outward * f32x8::from_slice(simd, &lids.b));
     let over = along_u + along_v + (by_w * above).max(-by_w * below);
     let away_d = slopes.by_d * (d - slopes.d);
     let away_z = slopes.by_z * (z - slopes.z);
@@ -372,8 +373,10 @@ pub(crate) fn lid_bounds<S: Simd>(
 
 /// The most of `by·s − bend·s²` for s in [0, 1].
 #[inline(always)]
-fn rise<S: Simd>(by: f32x8<S>, bend: f32x8<S>) -> f32x8<S> {
+fn rise<S: Simd>(simd: S, by: f32x8<S>, bend: f32x8<S>) -> f32x8<S> {
     let s = (by / (bend + bend).max(1.0e-30)).min(1.0);
+    // What bends outward is highest at its end, even where it starts out level and `s` would be 0.
+    let s = bend.simd_lt(0.0).select(f32x8::splat(simd, 1.0), s);
     s * (by - bend * s)
 }
 
@@ -650,6 +653,28 @@ mod tests {
             x,
             cos: libm::cos(angle),
             sin: libm::sin(angle),
+        }
+    }
+
+    #[inline(always)]
+    fn rises<S: Simd>(simd: S, by: [f32; 8], bend: [f32; 8]) -> [f32; 8] {
+        let [by, bend] = [by, bend].map(|v| f32x8::from_slice(simd, &v));
+        *rise(simd, by, bend)
+    }
+
+    #[test]
+    fn a_rise_is_nowhere_exceeded() {
+        let by = [0.0, 0.0, 1.0e-35, 1.0e-6, 1.0, 1.0, 0.0, 3.0];
+        let bend = [-2.0, 2.0, -1.0e-3, -1.0, 2.0, -0.5, 0.0, 1.0e-35];
+        for level in Level::available() {
+            let most = with_simd!(level, simd => rises(simd, by, bend));
+            for i in 0..=100 {
+                let s = i as f32 / 100.0;
+                for lane in 0..8 {
+                    let at = by[lane] * s - bend[lane] * s * s;
+                    assert!(at <= most[lane] + 1.0e-6, "{level}, lane {lane} at {s}");
+                }
+            }
         }
     }
 
