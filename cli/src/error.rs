@@ -41,6 +41,14 @@ pub(crate) enum Error {
     JobFailed { address: String, reason: String },
     #[error("the master at {address} sent a path that cannot be right: {reason}")]
     BadReply { address: String, reason: String },
+    #[error(
+        "{what} gave another path than {than}: position {position} of those measured differs; please report this with the job"
+    )]
+    Differs {
+        what: String,
+        than: &'static str,
+        position: usize,
+    },
     #[error("cannot start threads: {0}")]
     Threads(String),
     #[error("interrupted")]
@@ -54,7 +62,9 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Core(e) | Self::Formats(horma_formats::Error::Core(e)) => of_core(e),
-            Self::Formats(horma_formats::Error::NoContact { .. }) | Self::Impossible { .. } => 3,
+            Self::Formats(horma_formats::Error::NoContact { .. })
+            | Self::Impossible { .. }
+            | Self::Differs { .. } => 3,
             Self::Master(horma_master::Error::Plan(e)) => of_core(e),
             Self::Formats(_)
             | Self::Bind { .. }
