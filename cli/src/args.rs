@@ -51,6 +51,8 @@ pub(crate) enum Command {
     Run(Run),
     /// Send a job to a running master, and fetch its path
     Submit(Submit),
+    /// Hold a path against the designed surface: gouges, excess, scallops
+    Verify(Verify),
     /// Serve as a master: workers register, clients submit jobs
     Master(Master),
     /// Serve as a worker of a master
@@ -93,6 +95,28 @@ pub(crate) struct Run {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct Verify {
+    /// The path: the columns of a path.csv; the contact may be empty
+    #[arg(value_name = "PATH.csv")]
+    pub path: PathBuf,
+    /// The job file (TOML): its part, cutter and step
+    #[arg(value_name = "JOB")]
+    pub job: PathBuf,
+    /// Deepest gouge allowed, normal to the surface, mm [default: the job's chordal tolerance]
+    #[arg(long, value_name = "MM")]
+    pub tolerance: Option<f64>,
+    /// Distance between samples of the surface, mm [default: such that there are about 240000]
+    #[arg(long, value_name = "MM")]
+    pub spacing: Option<f64>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Threads [default: all cores]
+    #[arg(long, value_name = "N", env = "HORMA_THREADS", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct Submit {
     #[command(flatten)]
     pub job: Job,
@@ -113,6 +137,10 @@ pub(crate) struct Job {
     /// Show nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
+    /// Do not hold the path against the designed surface; a gouge deeper than the tolerance then goes
+    /// unnoticed
+    #[arg(long)]
+    pub no_verify: bool,
     /// What the cutter touches: facet or point
     #[arg(
         long,
@@ -120,9 +148,29 @@ pub(crate) struct Job {
         help_heading = "Instead of the job file's"
     )]
     pub contact: Option<String>,
-    /// How the touch is searched: exact or brute
+    /// How the touch is searched: exact, brute or local
     #[arg(long, env = "HORMA_METHOD", help_heading = "Instead of the job file's")]
     pub method: Option<String>,
+    /// Rows around the last winner that the local search looks at: fewer than this away
+    #[arg(
+        long,
+        value_name = "ROWS",
+        env = "HORMA_DELTA_U",
+        help_heading = "Instead of the job file's"
+    )]
+    pub delta_u: Option<u32>,
+    /// Columns around the last winner that the local search looks at
+    #[arg(
+        long,
+        value_name = "COLUMNS",
+        env = "HORMA_DELTA_V",
+        help_heading = "Instead of the job file's"
+    )]
+    pub delta_v: Option<u32>,
+    /// Leave the local search as the papers have it: where the window has lost the winner the path is
+    /// wrong; the report says where and by how much
+    #[arg(long, help_heading = "Instead of the job file's")]
+    pub no_fallback: bool,
     /// Chordal tolerance of surfaces, mm
     #[arg(
         long,
@@ -198,6 +246,9 @@ impl Job {
             distribution: self.distribution.clone(),
             contact: self.contact.clone(),
             method: self.method.clone(),
+            delta_u: self.delta_u,
+            delta_v: self.delta_v,
+            fallback: self.no_fallback.then_some(false),
             tolerance: self.tolerance,
             step: self.step,
             points_per_revolution: self.points_per_revolution,

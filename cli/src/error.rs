@@ -49,6 +49,17 @@ pub(crate) enum Error {
         than: &'static str,
         position: usize,
     },
+    #[error("the path gouges the part by {depth:.4} mm, more than the tolerance of {tolerance} mm, at [{:.3}, {:.3}, {:.3}] of the part (position {position}: travel {x:.3}, angle {angle:.2}°); digitize facets (contact = \"facet\") to a finer tolerance, or skip the verification with --no-verify", point[0], point[1], point[2])]
+    Gouge {
+        depth: f64,
+        tolerance: f64,
+        point: [f64; 3],
+        position: u64,
+        x: f64,
+        angle: f64,
+    },
+    #[error("{what}, which takes one process; use `horma run` without workers")]
+    OneProcess { what: &'static str },
     #[error("cannot start threads: {0}")]
     Threads(String),
     #[error("interrupted")]
@@ -64,13 +75,15 @@ impl Error {
             Self::Core(e) | Self::Formats(horma_formats::Error::Core(e)) => of_core(e),
             Self::Formats(horma_formats::Error::NoContact { .. })
             | Self::Impossible { .. }
-            | Self::Differs { .. } => 3,
+            | Self::Differs { .. }
+            | Self::Gouge { .. } => 3,
             Self::Master(horma_master::Error::Plan(e)) => of_core(e),
             Self::Formats(_)
             | Self::Bind { .. }
             | Self::Exposed { .. }
             | Self::Address { .. }
             | Self::Refused { .. }
+            | Self::OneProcess { .. }
             | Self::Worker(horma_worker::Error::Address { .. }) => 2,
             Self::Master(_)
             | Self::Worker(_)

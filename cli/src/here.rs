@@ -2,7 +2,10 @@
 
 use std::time::Instant;
 
-use horma_core::{Digitizer, Job, Part, Phase, Plan, Record, Simd, SubTrajectory, stitch};
+use horma_core::{
+    Counters, Digitizer, Heuristic, Job, Local, Method, Part, Phase, Plan, Record, Simd,
+    SubTrajectory, ToolPath, stitch,
+};
 use horma_master::Outcome;
 use tokio_util::sync::CancellationToken;
 
@@ -43,9 +46,63 @@ fn pipeline(
     let plan = Plan::new(part, job, system::memory())?;
     timed("discretize", begin);
 
+    let (job, heuristic) = match job.method {
+        Method::Local(local) if local.window.is_none() || !local.fallback => {
+            display.tell("find the window", 0, 0);
+            let begin = Instant::now();
+            let rows = &plan.model.rows;
+            let heuristic = Heuristic::new(&job, local, rows, &plan.trajectory, simd);
+            let window = local.window.unwrap_or_else(|| heuristic.smallest_window());
+            timed("find the window", begin);
+            let window = Some(window);
+            let method = Method::Local(Local { window, ..local });
+            (
+                Job { method, ..job },
+                (!local.fallback).then_some(heuristic),
+            )
+        }
+        _ => (job, None),
+    };
+    let window = match job.method {
+        Method::Local(local) => local.window,
+        Method::Exact | Method::Brute => None,
+    };
+    let (path, counters) = match (heuristic, window) {
+        (Some(heuristic), Some(window)) => {
+            display.tell("digitize", 0, 0);
+            let begin = Instant::now();
+            let (touches, counters) = heuristic.run(window);
+            timed("digitize", begin);
+            let path = ToolPath {
+                trajectory: plan.trajectory,
+                touches,
+            };
+            (path, counters)
+        }
+        _ => digitize(&plan, &job, simd, display, stop, &mut timed)?,
+    };
+    let record = Record {
+        phases,
+        bodies: plan.model.bodies,
+        counters,
+        window,
+        ..Record::default()
+    };
+    Ok((path, record))
+}
+
+/// Digitizes all positions and stitches what the threads found.
+fn digitize(
+    plan: &Plan,
+    job: &Job,
+    simd: Simd,
+    display: &Display,
+    stop: &CancellationToken,
+    timed: &mut impl FnMut(&'static str, Instant),
+) -> Result<(ToolPath, Counters)> {
     display.tell("build", 0, 0);
     let begin = Instant::now();
-    let digitizer = Digitizer::new(&job, &plan.model.rows, simd);
+    let digitizer = Digitizer::new(job, &plan.model.rows, simd);
     timed("build", begin);
 
     let total = plan.trajectory.positions;
@@ -68,11 +125,5 @@ fn pipeline(
     let begin = Instant::now();
     let path = stitch(plan.trajectory, parts)?;
     timed("stitch", begin);
-    let record = Record {
-        phases,
-        bodies: plan.model.bodies,
-        counters,
-        ..Record::default()
-    };
-    Ok((path, record))
+    Ok((path, counters))
 }

@@ -10,6 +10,7 @@ mod run;
 mod cluster;
 mod here;
 mod submit;
+mod verify;
 
 mod bench;
 mod inspect;
@@ -65,6 +66,7 @@ fn execute(arguments: Arguments) -> Result<()> {
     match arguments.command {
         Command::Run(run) => run::run(&run),
         Command::Submit(submit) => run::submit(&submit),
+        Command::Verify(args) => verify::verify(&args),
         Command::Master(master) => serve::master(&master),
         Command::Worker(worker) => serve::worker(worker),
         Command::Init { directory } => inspect::init(&directory),

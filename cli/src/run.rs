@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Instant;
 
-use horma_core::{Part, Phase, Simd, ToolPath, place};
+use horma_core::{Counters, Method, Part, Phase, Position, Simd, ToolPath, Verification, place};
 use horma_formats::job::{self, JobFile};
 use horma_formats::output::Staging;
 use horma_formats::report::{self, PathStatistics, Report};
@@ -19,13 +19,14 @@ use crate::args;
 use crate::error::{Error, Result};
 use crate::progress::Display;
 use crate::serve::{NOTICE, runtime};
-use crate::{cluster, here, say, submit, system};
+use crate::{cluster, here, say, submit, system, verify};
 
 /// Computes a job in this process or on local workers.
 pub(crate) fn run(args: &args::Run) -> Result<()> {
     perform(
         &args.job,
         args.workers,
+        args.threads.map(usize::from),
         async |part, file, display, stop| {
             let threads = args.threads.map(usize::from);
             let simd = args.simd.unwrap_or_else(Simd::best);
@@ -44,7 +45,13 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
 
 /// Has a job computed by a master elsewhere.
 pub(crate) fn submit(args: &args::Submit) -> Result<()> {
-    perform(&args.job, None, async |part, file, display, _| {
+    perform(&args.job, None, None, async |part, file, display, _| {
+        if let Method::Local(local) = file.job.method
+            && (!local.fallback || local.window.is_none())
+        {
+            let what = "a chain of windows without a fallback, or a search for its size, needs the whole path";
+            return Err(Error::OneProcess { what });
+        }
         submit::run(part, file.job, &args.master, progress(display)).await
     })
 }
@@ -53,6 +60,7 @@ pub(crate) fn submit(args: &args::Submit) -> Result<()> {
 fn perform(
     args: &args::Job,
     workers: Option<u32>,
+    threads: Option<usize>,
     compute: impl AsyncFnOnce(Part, &JobFile, Display, CancellationToken) -> Result<Outcome>,
 ) -> Result<()> {
     let runtime = runtime()?;
@@ -82,11 +90,26 @@ fn perform(
             outcome = compute(part.clone(), &file, display.clone(), stop.clone()) => outcome?,
         };
         record.phases.insert(0, read);
+        let verification = if args.no_verify {
+            None
+        } else {
+            display.tell("verify", 0, 0);
+            let begin = Instant::now();
+            let threads = threads.unwrap_or_else(system::cores);
+            let found = tokio::select! {
+                biased;
+                () = stop.cancelled() => return Err(Error::Interrupted),
+                found = verified(part.clone(), file.clone(), path.positions(), threads) => found?,
+            };
+            record.phases.push(phase("verify", begin));
+            Some(found)
+        };
         let report = Report {
             version: VERSION.to_owned(),
             job: file.echo(),
             warnings,
             path: PathStatistics::of(&path),
+            verification,
             record,
         };
         write(args, &file, &part, &path, report, &display, &stop)
@@ -99,6 +122,23 @@ fn perform(
         summarize(&args.output, &report);
     }
     Ok(())
+}
+
+/// Verifies a path beside the runtime, and refuses one that gouges deeper than the job's tolerance.
+async fn verified(
+    part: Part,
+    file: JobFile,
+    positions: Vec<Position>,
+    threads: usize,
+) -> Result<Verification> {
+    let checking = tokio::task::spawn_blocking(move || {
+        let found = verify::check(&part, &file, &positions, None, threads)?;
+        if let Some(tolerance) = verify::tolerance(&file) {
+            verify::hold(&found, tolerance)?;
+        }
+        Ok(found)
+    });
+    checking.await.unwrap_or(Err(Error::Interrupted))
 }
 
 /// Writes all results, or none.
@@ -175,9 +215,20 @@ fn summarize(dir: &Path, report: &Report) {
             output::REPORT
         ),
     };
+    let window = report.record.window.map_or(String::new(), |window| {
+        let Counters {
+            lost, largest_loss, ..
+        } = report.record.counters;
+        format!(
+            "\nwindows of {} rows and {} columns lost the winner {lost} times, by {largest_loss:.4} mm at most",
+            window.delta_u, window.delta_v
+        )
+    });
+    let verification = report.verification.as_ref();
+    let verification = verification.map_or(String::new(), |v| format!("\n{}", verify::describe(v)));
     let path = &report.path;
     say(&format!(
-        "{} positions, {} without contact{lost}\n{}\n{}\n{}\n{}",
+        "{} positions, {} without contact{lost}{window}{verification}\n{}\n{}\n{}\n{}",
         path.positions,
         path.without_contact,
         dir.join(output::PATH).display(),

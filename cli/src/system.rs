@@ -18,9 +18,9 @@ pub(crate) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
-/// Cores that all programs together kept busy in the last minute, on average; 0 where nobody counts.
+/// Threads of all programs that wanted a core in the last minute, on average; 0 where nobody counts.
 pub(crate) fn load() -> f64 {
-    System::load_average().one
+    System::load_average().map_or(0.0, |load| load.one)
 }
 
 /// A name for this process that differs from others' on this and other machines.

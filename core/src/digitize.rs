@@ -9,19 +9,19 @@ use std::ops::Range;
 use fearless_simd::Simd as Vectors;
 use rayon::prelude::*;
 
-use crate::blocks::{Block, facet_blocks, facet_leaf, point_blocks, point_leaf};
-use crate::contact::{Pose, least_height, touch_facet};
+use crate::blocks::{facet_blocks, facet_leaf, point_blocks, point_leaf};
+use crate::contact::{Pose, least_height};
 use crate::cutter::Cutter;
-use crate::job::{Contact, Job, Method};
-use crate::leaf::{Best, FacetLeaf, Leaf, PointLeaf};
+use crate::job::{Contact, Job, Local, Method, Window};
+use crate::leaf::{FacetLeaf, Leaf, PointLeaf};
+use crate::local::{self, Grids};
 use crate::motion::Trajectory;
 use crate::path::Touch;
 use crate::record::Counters;
-use crate::row::{Facet, Row, facets, starts};
+use crate::row::{Row, starts};
 use crate::simd::{Simd, with_simd};
-use crate::sweep::Sweep;
+use crate::sweep::{self, AllFacets, Sweep};
 use crate::tree::{Start, Tree};
-use crate::vector::Point;
 
 /// Positions that one thread takes at a time: these many at least, and a few revolutions.
 const CHUNK: u64 = 256;
@@ -39,26 +39,27 @@ enum Search {
     Points(Tree<PointLeaf>),
     Facets(Tree<FacetLeaf>),
     AllPoints(Sweep),
-    AllFacets(Vec<(u64, [Point; 3])>),
+    AllFacets(AllFacets),
+    Windows {
+        grids: Grids,
+        tree: Tree<PointLeaf>,
+        window: Window,
+    },
 }
 
 impl Digitizer {
     /// Makes rows ready; they are in order of their ids. Runs on the current thread pool.
     pub fn new(job: &Job, rows: &[Row], simd: Simd) -> Self {
         let search = match (job.method, job.contact) {
-            (Method::Exact, Contact::Point) => {
-                Search::Points(Tree::new(Vec::new(), point_blocks(rows), |_, b| {
-                    point_leaf(rows, b)
-                }))
-            }
-            (Method::Exact, Contact::Facet) => {
-                let starts = starts(rows);
-                let points = rows.iter().flat_map(|r| r.points.iter().copied()).collect();
-                let fill = |points: &[Point], b: &Block| facet_leaf(rows, &starts, points, b);
-                Search::Facets(Tree::new(points, facet_blocks(rows), fill))
-            }
-            (Method::Brute, Contact::Point) => Search::AllPoints(Sweep::new(rows)),
-            (Method::Brute, Contact::Facet) => Search::AllFacets(all_facets(rows)),
+            (Method::Exact, Contact::Point) => Search::Points(point_tree(rows)),
+            (Method::Exact, Contact::Facet) => Search::Facets(facet_tree(rows)),
+            (Method::Brute, Contact::Point) => Search::AllPoints(Sweep::new(rows, &[], false)),
+            (Method::Brute, Contact::Facet) => Search::AllFacets(AllFacets::new(rows)),
+            (Method::Local(local), _) => Search::Windows {
+                grids: Grids::new(rows, local.culling),
+                tree: point_tree(rows),
+                window: local.window.unwrap_or(Window::EVERYTHING),
+            },
         };
         Self {
             cutter: job.cutter,
@@ -72,6 +73,7 @@ impl Digitizer {
         match &self.search {
             Search::Points(tree) => tree.bytes(),
             Search::Facets(tree) => tree.bytes(),
+            Search::Windows { tree, .. } => tree.bytes(),
             Search::AllPoints(_) | Search::AllFacets(_) => 0,
         }
     }
@@ -120,26 +122,136 @@ impl Digitizer {
         directions: &[(f64, f64)],
         positions: Range<u64>,
     ) -> (Vec<Option<Touch>>, Counters) {
-        let poses = positions.map(|index| {
-            let revolution = u64::from(trajectory.points_per_revolution);
-            let (cos, sin) = directions[(index % revolution) as usize];
-            let x = trajectory.travel(index);
-            Pose { x, cos, sin }
-        });
-        let revolution = trajectory.points_per_revolution as usize;
+        let poses = poses(trajectory, directions, positions);
+        let (cutter, revolution) = (&self.cutter, trajectory.points_per_revolution as usize);
         match &self.search {
             Search::Points(tree) => {
-                with_simd!(self.simd, simd => exact(simd, &self.cutter, tree, revolution, poses))
+                with_simd!(self.simd, simd => exact(simd, cutter, tree, revolution, poses))
             }
             Search::Facets(tree) => {
-                with_simd!(self.simd, simd => exact(simd, &self.cutter, tree, revolution, poses))
+                with_simd!(self.simd, simd => exact(simd, cutter, tree, revolution, poses))
             }
             Search::AllPoints(sweep) => {
-                with_simd!(self.simd, simd => brute(simd, &self.cutter, sweep, poses))
+                with_simd!(self.simd, simd => sweep::run(simd, cutter, sweep, poses))
             }
-            Search::AllFacets(facets) => brute_facets(&self.cutter, facets, poses),
+            Search::AllFacets(facets) => facets.run(cutter, poses),
+            Search::Windows {
+                grids,
+                tree,
+                window,
+            } => with_simd!(self.simd, simd => {
+                local::run(simd, cutter, grids, tree, *window, poses)
+            }),
         }
     }
+}
+
+/// The papers' search without a fallback: one chain of windows from the first position to the last.
+#[derive(Debug)]
+pub struct Heuristic {
+    grids: Grids,
+    cutter: Cutter,
+    simd: Simd,
+    poses: Vec<Pose>,
+    exact: Vec<Option<Touch>>,
+}
+
+impl Heuristic {
+    /// Makes rows ready, and finds the exact path to hold the chains against. Runs on the current
+    /// thread pool.
+    pub fn new(job: &Job, local: Local, rows: &[Row], trajectory: &Trajectory, simd: Simd) -> Self {
+        let exact_job = Job {
+            method: Method::Exact,
+            ..*job
+        };
+        let positions = 0..trajectory.positions;
+        let mut exact = Vec::new();
+        Digitizer::new(&exact_job, rows, simd).run_chunks(
+            trajectory,
+            positions.clone(),
+            |_, touches| {
+                exact.extend(touches);
+                true
+            },
+        );
+        Self {
+            grids: Grids::new(rows, local.culling),
+            cutter: job.cutter,
+            simd,
+            poses: poses(trajectory, &trajectory.directions(), positions).collect(),
+            exact,
+        }
+    }
+
+    /// The path by windows alone, and at how many positions it is wrong.
+    pub fn run(&self, window: Window) -> (Vec<Option<Touch>>, Counters) {
+        self.chain(window, u64::MAX)
+    }
+
+    /// The smallest window that never loses the winner on this part: about square at first, then each
+    /// side is made smaller as far as it goes.
+    pub fn smallest_window(&self) -> Window {
+        let holds = |delta_u, delta_v| {
+            let window = Window { delta_u, delta_v };
+            self.chain(window, 0).1.lost == 0
+        };
+        let mut side = 1;
+        while side < Window::EVERYTHING.delta_u && !holds(side, side) {
+            side *= 2;
+        }
+        let delta_u = smallest(side, |delta_u| holds(delta_u, side));
+        let delta_v = smallest(side, |delta_v| holds(delta_u, delta_v));
+        Window { delta_u, delta_v }
+    }
+
+    /// Stops once more than `allowed` positions are wrong.
+    fn chain(&self, window: Window, allowed: u64) -> (Vec<Option<Touch>>, Counters) {
+        let (poses, exact) = (&self.poses, &self.exact);
+        with_simd!(self.simd, simd => {
+            local::chain(simd, &self.cutter, &self.grids, window, poses, exact, allowed)
+        })
+    }
+}
+
+/// The smallest number up to `enough` that holds, if all above it do.
+fn smallest(enough: u32, holds: impl Fn(u32) -> bool) -> u32 {
+    let (mut low, mut high) = (0, enough);
+    while high - low > 1 {
+        let middle = low + (high - low) / 2;
+        if holds(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    high
+}
+
+fn poses(
+    trajectory: &Trajectory,
+    directions: &[(f64, f64)],
+    positions: Range<u64>,
+) -> impl Iterator<Item = Pose> {
+    positions.map(move |index| {
+        let revolution = u64::from(trajectory.points_per_revolution);
+        let (cos, sin) = directions[(index % revolution) as usize];
+        let x = trajectory.travel(index);
+        Pose { x, cos, sin }
+    })
+}
+
+fn point_tree(rows: &[Row]) -> Tree<PointLeaf> {
+    Tree::new(Vec::new(), point_blocks(rows), |_, block| {
+        point_leaf(rows, block)
+    })
+}
+
+fn facet_tree(rows: &[Row]) -> Tree<FacetLeaf> {
+    let starts = starts(rows);
+    let points = rows.iter().flat_map(|r| r.points.iter().copied()).collect();
+    Tree::new(points, facet_blocks(rows), |points, block| {
+        facet_leaf(rows, &starts, points, block)
+    })
 }
 
 #[inline(always)]
@@ -161,7 +273,10 @@ fn exact<S: Vectors, L: Leaf>(
                 floor = floor.max(least_height(cutter, &pose, touch.contact));
             }
         }
-        let touch = tree.search(simd, cutter, &pose, &Start { floor, place }, &mut counters);
+        let start = Start { floor, place };
+        let touch = tree
+            .search(simd, cutter, &pose, &start, &mut counters)
+            .touch();
         if let Some(touch) = touch {
             let [d, _, z] = pose.face(touch.contact);
             place = [d, z];
@@ -169,50 +284,4 @@ fn exact<S: Vectors, L: Leaf>(
         touches.push(touch);
     }
     (touches, counters)
-}
-
-#[inline(always)]
-fn brute<S: Vectors>(
-    simd: S,
-    cutter: &Cutter,
-    sweep: &Sweep,
-    poses: impl Iterator<Item = Pose>,
-) -> (Vec<Option<Touch>>, Counters) {
-    // A loop and no closure: only what is written here is compiled for the instruction set.
-    let mut counters = Counters::default();
-    let mut touches = Vec::with_capacity(poses.size_hint().0);
-    for pose in poses {
-        let mut best = Best::above(f64::NEG_INFINITY);
-        counters.evaluations += sweep.search(simd, cutter, &pose, &mut best);
-        touches.push(best.touch());
-    }
-    (touches, counters)
-}
-
-fn all_facets(rows: &[Row]) -> Vec<(u64, [Point; 3])> {
-    let points: Vec<Point> = rows.iter().flat_map(|r| r.points.iter().copied()).collect();
-    let facet = |f: Facet| {
-        let id = u64::from(rows[f.row].id) << 32 | f.number as u64;
-        (id, f.corners.map(|c| points[c as usize]))
-    };
-    facets(rows).map(facet).collect()
-}
-
-fn brute_facets(
-    cutter: &Cutter,
-    facets: &[(u64, [Point; 3])],
-    poses: impl Iterator<Item = Pose>,
-) -> (Vec<Option<Touch>>, Counters) {
-    let mut counters = Counters::default();
-    let touch = |pose: Pose| {
-        let mut best = Best::above(f64::NEG_INFINITY);
-        for &(id, corners) in facets {
-            if let Some(touch) = touch_facet(cutter, &pose, corners) {
-                best.raise(touch, id);
-            }
-        }
-        counters.evaluations += facets.len() as u64;
-        best.touch()
-    };
-    (poses.map(touch).collect(), counters)
 }

@@ -59,6 +59,19 @@ pub enum Error {
         /// Most rows, and most columns.
         limit: usize,
     },
+    /// Windows around the last winner where there are no rows and columns.
+    #[error(
+        "{name} is a mesh, but the local search needs surfaces, which have rows and columns; choose the exact one"
+    )]
+    LocalNeedsGrids {
+        /// Name of the mesh.
+        name: String,
+    },
+    /// Windows around the last winner over facets.
+    #[error(
+        "the local search is over points, as in the papers; set contact to point, or choose the exact one"
+    )]
+    LocalNeedsPoints,
     /// An instruction set that is unknown or that this machine lacks.
     #[error("{name:?} is no instruction set of this machine, which has {}", available.join(", "))]
     NoSuchSimd {

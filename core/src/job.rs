@@ -1,7 +1,9 @@
 //! What to compute: everything about a job but the part.
 
 use crate::cutter::Cutter;
-use crate::error::{Result, bounded};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result, bounded};
 use crate::motion::Motion;
 
 /// How to digitize a part.
@@ -66,11 +68,82 @@ pub enum Contact {
     Facet,
 }
 
-/// How the touch is searched. Both give the same bits.
+/// How the touch is searched. All give the same bits, but for [`Local`] without its fallback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// Only where it can be, by a hierarchy of bounds.
     Exact,
     /// Everywhere: Algorithm 1 of the 2001 paper.
     Brute,
+    /// Around the last winners: Algorithm 2 of the 2001 paper.
+    Local(Local),
+}
+
+/// The search around the last winner on each surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Local {
+    /// How far around it; by default the smallest window that never loses the winner.
+    pub window: Option<Window>,
+    /// Points that are not evaluated.
+    pub culling: Culling,
+    /// Whether to fall back on the exact search where the window has lost the winner. Without it the
+    /// path is the paper's, which may gouge.
+    pub fallback: bool,
+}
+
+/// Only points less than this away from the last winner, in rows and in columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Window {
+    /// δu, rows.
+    pub delta_u: u32,
+    /// δv, columns; round closed surfaces it wraps.
+    pub delta_v: u32,
+}
+
+/// Points that are left out before their height is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Culling {
+    /// Those whose surface faces away from the cutter.
+    pub back_faces: bool,
+    /// Those beyond the cutter's width: outside the tool's area of influence.
+    pub beyond_reach: bool,
+}
+
+impl Window {
+    /// Larger than any grid.
+    pub const EVERYTHING: Self = Self {
+        delta_u: 1 << 30,
+        delta_v: 1 << 30,
+    };
+}
+
+impl Method {
+    /// Checks the numbers and that the method fits the job.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfBounds`] for a window that holds nothing, [`crate::Error::LocalNeedsPoints`]
+    /// for windows over facets.
+    pub fn validate(&self, contact: Contact) -> Result<()> {
+        let Self::Local(local) = self else {
+            return Ok(());
+        };
+        if contact == Contact::Facet {
+            return Err(Error::LocalNeedsPoints);
+        }
+        local.window.map_or(Ok(()), |window| {
+            let least = "at least 1";
+            bounded(
+                "delta_u",
+                f64::from(window.delta_u),
+                window.delta_u > 0,
+                least,
+            )?;
+            bounded(
+                "delta_v",
+                f64::from(window.delta_v),
+                window.delta_v > 0,
+                least,
+            )
+        })
+    }
 }

@@ -39,6 +39,7 @@ mod blocks;
 mod leaf;
 mod tree;
 
+mod local;
 mod sweep;
 
 mod digitize;
@@ -50,11 +51,11 @@ mod verify;
 mod record;
 
 pub use cutter::Cutter;
-pub use digitize::Digitizer;
+pub use digitize::{Digitizer, Heuristic};
 pub use discretize::{Model, discretize};
 pub use error::{Error, Result};
 pub use extent::Extent;
-pub use job::{Contact, Discretization, Job, Method};
+pub use job::{Contact, Culling, Discretization, Job, Local, Method, Window};
 pub use motion::{Motion, MotionKind, Trajectory};
 pub use part::{Body, Mesh, Part, Shape};
 pub use path::{SubTrajectory, ToolPath, Touch, stitch};

@@ -3,9 +3,9 @@
 use crate::discretize::{Layout, Model, fill, layout};
 use crate::error::{Error, Result};
 use crate::extent::{Extent, split};
-use crate::job::{Discretization, Job};
+use crate::job::{Discretization, Job, Method};
 use crate::motion::Trajectory;
-use crate::part::{Part, Shape};
+use crate::part::{Body, Part, Shape};
 use crate::vector::Interval;
 
 /// A job ready to be digitized, here or elsewhere.
@@ -35,6 +35,16 @@ impl Plan {
         part.validate()?;
         job.motion.validate()?;
         job.discretization.validate()?;
+        job.method.validate(job.contact)?;
+        if let Method::Local(_) = job.method {
+            let mesh = part
+                .bodies
+                .iter()
+                .find(|b| matches!(b.shape, Shape::Mesh(_)));
+            if let Some(Body { name, .. }) = mesh {
+                return Err(Error::LocalNeedsGrids { name: name.clone() });
+            }
+        }
         let half_width = job.cutter.half_width();
         // The net of poles holds its surface, so this is an upper bound, and it costs nothing.
         let upper = job.motion.over(hull(part), half_width)?;

@@ -3,6 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::job::Window;
+
 /// What happened during a run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Record {
@@ -12,6 +14,8 @@ pub struct Record {
     pub bodies: Vec<BodyRecord>,
     /// What the searches cost together.
     pub counters: Counters,
+    /// The windows of the local search.
+    pub window: Option<Window>,
     /// Who took part; nobody if it was one process.
     pub workers: Vec<WorkerRecord>,
     /// Each extent as it was delivered, in order.
@@ -50,18 +54,32 @@ pub struct BodyRecord {
 }
 
 /// What a search cost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Counters {
     /// Candidates, points or facets, whose height was computed.
     pub evaluations: u64,
-    /// Nodes of the hierarchy whose bound was computed.
+    /// Nodes of the hierarchy whose children's bounds were computed.
     pub nodes: u64,
+    /// Positions at which the local search had lost the winner.
+    pub lost: u64,
+    /// By how much its height was too low there, at most, mm.
+    pub largest_loss: f64,
+}
+
+impl Counters {
+    /// Counts a position at which the local search was too low.
+    pub(crate) fn lose(&mut self, by: f64) {
+        self.lost += 1;
+        self.largest_loss = self.largest_loss.max(by);
+    }
 }
 
 impl std::ops::AddAssign for Counters {
     fn add_assign(&mut self, other: Self) {
         self.evaluations += other.evaluations;
         self.nodes += other.nodes;
+        self.lost += other.lost;
+        self.largest_loss = self.largest_loss.max(other.largest_loss);
     }
 }
 

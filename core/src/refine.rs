@@ -38,11 +38,17 @@ const GOAL: f64 = 0.98;
 /// Most points of one surface's grid.
 const MAX_POINTS: usize = 1 << 26;
 
+/// Share of the tolerance that the samples may use up: a peak midway between two of them is up to a
+/// sixteenth higher than what is seen.
+const SEEN: f64 = 16.0 / 17.0;
+
 /// Points of the grid that is measured when the one asked for has too many.
 const TRIAL_POINTS: f64 = (1 << 18) as f64;
 
 /// Finds the lines of a grid whose facets are within `tolerance` (mm) of the surface at every sample.
 pub(crate) fn refine(name: &str, surface: &Surface, tolerance: f64) -> Result<Lines> {
+    let asked = tolerance;
+    let tolerance = SEEN * asked;
     let net = Net::new(surface);
     let bends = bends(surface, tolerance);
     let densities = balance(&bends);
@@ -51,7 +57,7 @@ pub(crate) fn refine(name: &str, surface: &Surface, tolerance: f64) -> Result<Li
         rows: grid.us.len(),
         columns: grid.vs.len(),
         deviation: measured.worst(),
-        tolerance,
+        tolerance: asked,
     };
     let [m, n] = densities.lines(&bends);
     if !fits(m, n) {

@@ -1,36 +1,41 @@
-//! Brute force over points: Algorithm 1 of the 2001 paper, with vectors of its own.
+//! Brute force: Algorithm 1 of the 2001 paper, over points with vectors of its own.
 //!
 //! All points of all rows in one long array for each coordinate, swept from end to end for every
 //! position. No bound is used here, so that it checks what the bounds skip.
 
+use std::ops::Range;
+
 use fearless_simd::{Simd, f64x8, prelude::*};
 
-use crate::contact::Pose;
+use crate::contact::{Pose, touch_facet};
 use crate::cutter::Cutter;
 use crate::lanes::{LANES, heights};
 use crate::leaf::Best;
 use crate::path::Touch;
-use crate::row::Row;
+use crate::record::Counters;
+use crate::row::{Facet, Row, facets};
 use crate::vector::Point;
 
 /// The points of rows, in order of their numbers.
 #[derive(Debug)]
 pub(crate) struct Sweep {
     at: [Vec<f64>; 3],
+    /// y and z of a normal at each point, if those that face away are left out.
+    normals: Option<[Vec<f64>; 2]>,
+    /// Whether points beyond the cutter's width are left out.
+    within_width: bool,
     /// Ids of the rows and the places at which their points end.
     rows: Vec<(u32, usize)>,
-    count: usize,
 }
 
 impl Sweep {
-    pub fn new(rows: &[Row]) -> Self {
-        let points = || rows.iter().flat_map(|r| &r.points);
-        let count = points().count();
-        let padded = count.next_multiple_of(LANES);
-        let axis = |k: usize, filler: f64| {
-            let mut axis: Vec<f64> = points().map(|p| p[k]).collect();
-            axis.resize(padded, filler);
-            axis
+    /// All points; `normals` are one for each or none at all.
+    pub fn new(rows: &[Row], normals: &[Point], within_width: bool) -> Self {
+        let points: Vec<Point> = rows.iter().flat_map(|r| r.points.iter().copied()).collect();
+        // A vector's worth of room behind the last point.
+        let axis = |points: &[Point], k: usize, filler: f64| {
+            let filler = std::iter::repeat_n(filler, LANES);
+            points.iter().map(|p| p[k]).chain(filler).collect()
         };
         let mut end = 0;
         let ends = rows.iter().map(|r| {
@@ -39,50 +44,136 @@ impl Sweep {
         });
         Self {
             rows: ends.collect(),
-            at: [axis(0, f64::INFINITY), axis(1, 0.0), axis(2, 0.0)],
-            count,
+            at: [
+                axis(&points, 0, f64::INFINITY),
+                axis(&points, 1, 0.0),
+                axis(&points, 2, 0.0),
+            ],
+            normals: (!normals.is_empty()).then(|| [axis(normals, 1, 0.0), axis(normals, 2, 0.0)]),
+            within_width,
         }
     }
 
-    /// The highest of all points, and how many they are.
+    /// All places.
+    pub fn all(&self) -> Range<usize> {
+        0..self.at[0].len() - LANES
+    }
+
+    /// Raises `best` to the highest of the points at `places`; returns how many were evaluated.
     #[inline(always)]
-    pub fn search<S: Simd>(&self, simd: S, cutter: &Cutter, pose: &Pose, best: &mut Best) -> u64 {
-        let mut high = f64x8::splat(simd, f64::NEG_INFINITY);
+    pub fn search<S: Simd>(
+        &self,
+        simd: S,
+        cutter: &Cutter,
+        pose: &Pose,
+        places: Range<usize>,
+        best: &mut Best,
+    ) -> u64 {
+        let culled = self.within_width || self.normals.is_some();
+        let mut evaluated = if culled { 0 } else { places.len() as u64 };
+        let nowhere = f64x8::splat(simd, f64::NEG_INFINITY);
+        let mut high = nowhere;
         let mut place = f64x8::splat(simd, 0.0);
-        let mut index = f64x8::from_fn(simd, |i| i as f64);
-        let [xs, ys, zs] = &self.at;
-        let chunks = xs
-            .chunks_exact(LANES)
-            .zip(ys.chunks_exact(LANES))
-            .zip(zs.chunks_exact(LANES));
-        for ((x, y), z) in chunks {
-            let load = |axis: &[f64]| f64x8::from_slice(simd, axis);
-            let all = heights(simd, cutter, pose, [load(x), load(y), load(z)]);
+        let lanes = f64x8::from_fn(simd, |i| i as f64);
+        let end = places.end as f64;
+        let mut first = places.start;
+        while first < places.end {
+            let eight = first..first + LANES;
+            let x = f64x8::from_slice(simd, &self.at[0][eight.clone()]);
+            let y = f64x8::from_slice(simd, &self.at[1][eight.clone()]);
+            let z = f64x8::from_slice(simd, &self.at[2][eight.clone()]);
+            let index = lanes + first as f64;
+            first += LANES;
+            let mut wanted = index.simd_lt(end);
+            if culled {
+                if self.within_width {
+                    wanted &= (x - pose.x).abs().simd_le(cutter.half_width());
+                }
+                if let Some([ny, nz]) = &self.normals {
+                    let ny = f64x8::from_slice(simd, &ny[eight.clone()]);
+                    let nz = f64x8::from_slice(simd, &nz[eight]);
+                    wanted &= (ny * pose.cos - nz * pose.sin).simd_ge(0.0);
+                }
+                let kept = wanted.to_bitmask().count_ones();
+                evaluated += u64::from(kept);
+                if kept == 0 {
+                    continue;
+                }
+            }
+            let all = wanted.select(heights(simd, cutter, pose, [x, y, z]), nowhere);
             let above = all.simd_gt(high);
             high = above.select(all, high);
             place = above.select(index, place);
-            index += LANES as f64;
         }
         for lane in 0..LANES {
-            let touch = |place: usize| Touch {
-                height: high[lane],
-                contact: self.point(place),
-            };
-            if high[lane] > f64::NEG_INFINITY {
+            if high[lane] > f64::NEG_INFINITY && high[lane] >= best.height {
                 let at = place[lane] as usize;
-                best.raise(touch(at), self.number(at));
+                let contact = [self.at[0][at], self.at[1][at], self.at[2][at]];
+                let height = high[lane];
+                best.raise(Touch { height, contact }, self.number(at));
             }
         }
-        self.count as u64
+        evaluated
     }
 
-    fn point(&self, place: usize) -> Point {
-        [self.at[0][place], self.at[1][place], self.at[2][place]]
-    }
-
+    /// The number in the part of the point at a place.
     fn number(&self, place: usize) -> u64 {
         let row = self.rows.partition_point(|&(_, end)| end <= place);
         let begin = row.checked_sub(1).map_or(0, |before| self.rows[before].1);
         u64::from(self.rows[row].0) << 32 | (place - begin) as u64
+    }
+}
+
+/// The highest of all points for each of some poses.
+#[inline(always)]
+pub(crate) fn run<S: Simd>(
+    simd: S,
+    cutter: &Cutter,
+    sweep: &Sweep,
+    poses: impl Iterator<Item = Pose>,
+) -> (Vec<Option<Touch>>, Counters) {
+    // A loop and no closure: only what is written here is compiled for the instruction set.
+    let mut counters = Counters::default();
+    let mut touches = Vec::with_capacity(poses.size_hint().0);
+    for pose in poses {
+        let mut best = Best::above(f64::NEG_INFINITY);
+        counters.evaluations += sweep.search(simd, cutter, &pose, sweep.all(), &mut best);
+        touches.push(best.touch());
+    }
+    (touches, counters)
+}
+
+/// The facets of rows, with their numbers in the part.
+#[derive(Debug)]
+pub(crate) struct AllFacets(Vec<(u64, [Point; 3])>);
+
+impl AllFacets {
+    pub fn new(rows: &[Row]) -> Self {
+        let points: Vec<Point> = rows.iter().flat_map(|r| r.points.iter().copied()).collect();
+        let facet = |f: Facet| {
+            let id = u64::from(rows[f.row].id) << 32 | f.number as u64;
+            (id, f.corners.map(|c| points[c as usize]))
+        };
+        Self(facets(rows).map(facet).collect())
+    }
+
+    /// The highest of all facets for each of some poses.
+    pub fn run(
+        &self,
+        cutter: &Cutter,
+        poses: impl Iterator<Item = Pose>,
+    ) -> (Vec<Option<Touch>>, Counters) {
+        let mut counters = Counters::default();
+        let touch = |pose: Pose| {
+            let mut best = Best::above(f64::NEG_INFINITY);
+            for &(id, corners) in &self.0 {
+                if let Some(touch) = touch_facet(cutter, &pose, corners) {
+                    best.raise(touch, id);
+                }
+            }
+            counters.evaluations += self.0.len() as u64;
+            best.touch()
+        };
+        (poses.map(touch).collect(), counters)
     }
 }

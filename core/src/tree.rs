@@ -15,7 +15,6 @@ use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::LANES;
 use crate::leaf::{Best, Leaf};
-use crate::path::Touch;
 use crate::record::Counters;
 use crate::vector::{Interval, Point};
 
@@ -89,7 +88,7 @@ impl<L: Leaf> Tree<L> {
         pose: &Pose,
         start: &Start,
         counters: &mut Counters,
-    ) -> Option<Touch> {
+    ) -> Best {
         let mut best = Best::above(start.floor);
         loop {
             self.raise(simd, cutter, pose, start.place, &mut best, counters);
@@ -99,7 +98,7 @@ impl<L: Leaf> Tree<L> {
             // Rounding has put the floor above everything.
             best.height = f64::NEG_INFINITY;
         }
-        best.touch()
+        best
     }
 
     /// Raises `best` to the highest of all candidates.

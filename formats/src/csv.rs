@@ -6,7 +6,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use horma_core::{ToolPath, Touch};
+use horma_core::{Point, ToolPath, Touch};
 
 use crate::decimal::integer;
 use crate::error::{Error, Result};
@@ -27,8 +27,10 @@ pub struct Row {
     pub x: f64,
     /// Unwound angle, degrees.
     pub angle: f64,
-    /// Tool centre and contact; `None` where nothing was in reach.
-    pub touch: Option<Touch>,
+    /// Tool centre along the attack axis, mm; `None` where nothing was in reach.
+    pub height: Option<f64>,
+    /// The touched point in part coordinates, mm; paths from elsewhere may lack it.
+    pub contact: Option<Point>,
 }
 
 /// Writes `path` to `file`: beside it first, then renamed.
@@ -95,7 +97,7 @@ const SMALL: f64 = 1.0e-4;
 /// fraction.
 const LARGE: f64 = 9_007_199_254_740_992.0;
 
-/// Reads a file that [`save`] wrote.
+/// Reads a path: one that [`save`] wrote, or one from elsewhere in the same form.
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be read, [`Error::BadCsvLine`] for the first line that is not what
@@ -125,7 +127,8 @@ pub fn read(file: &Path) -> Result<Vec<Row>> {
 }
 
 /// What a line is, for the message.
-const SHAPE: &str = "an index and six numbers, the last four all there or all empty";
+const SHAPE: &str =
+    "an index and six numbers, of which y may be empty and the last three too, but only together";
 
 fn parse(line: &str) -> Option<Row> {
     let (index, rest) = line.split_once(',')?;
@@ -139,20 +142,20 @@ fn parse(line: &str) -> Option<Row> {
     }
     let value = |text: &str| text.parse::<f64>().ok().filter(|n| n.is_finite());
     let [x, angle, y, contact @ ..] = fields;
-    let touch = if y.is_empty() && contact == [""; 3] {
+    let height = if y.is_empty() { None } else { Some(value(y)?) };
+    let contact = if contact == [""; 3] {
         None
     } else {
-        let [cx, cy, cz] = contact.map(value);
-        Some(Touch {
-            height: value(y)?,
-            contact: [cx?, cy?, cz?],
-        })
+        let [x, y, z] = contact.map(value);
+        height?;
+        Some([x?, y?, z?])
     };
     Some(Row {
         index: index.parse().ok()?,
         x: value(x)?,
         angle: value(angle)?,
-        touch,
+        height,
+        contact,
     })
 }
 
@@ -231,7 +234,8 @@ index,x,angle,y,contact_x,contact_y,contact_z
         let rows = read(&file).expect("own format");
         assert_eq!(rows.len(), 4);
         for (row, touch) in rows.iter().zip(&path.touches) {
-            assert_eq!(row.touch, *touch);
+            assert_eq!(row.height, touch.map(|t| t.height));
+            assert_eq!(row.contact, touch.map(|t| t.contact));
             assert_eq!(row.x, path.trajectory.travel(row.index));
             assert_eq!(row.angle, path.trajectory.angle(row.index));
         }

@@ -5,6 +5,7 @@
 //! place of what the file says. An error names the file, the line and the key, and what would be
 //! right. Nothing is read here but the job itself; the part's files are only named.
 
+mod digitizing;
 mod echo;
 mod place;
 mod raw;
@@ -13,7 +14,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use horma_core::{
-    Axis, Contact, Cutter, Discretization, Job, Method, Motion, MotionKind, Point, unit,
+    Axis, Contact, Culling, Cutter, Discretization, Job, Local, Method, Motion, MotionKind, Point,
+    unit,
 };
 
 pub use self::place::Place;
@@ -80,6 +82,12 @@ pub struct Overrides {
     pub contact: Option<String>,
     /// `digitizing.method`
     pub method: Option<String>,
+    /// `digitizing.delta_u`, rows
+    pub delta_u: Option<u32>,
+    /// `digitizing.delta_v`, columns
+    pub delta_v: Option<u32>,
+    /// `digitizing.fallback`
+    pub fallback: Option<bool>,
     /// `discretization.tolerance`, mm; it also takes the place of a grid.
     pub tolerance: Option<f64>,
     /// `motion.step`, mm
@@ -117,37 +125,43 @@ pub fn parse(text: &str, path: &Path, overrides: &Overrides) -> Result<JobFile> 
     })?;
     raw.replace(overrides);
     let (files, axis) = source.part(&raw)?;
+    let (contact, method) = source.digitizing(&raw)?;
     let job = Job {
         discretization: source.discretization(&raw)?,
         cutter: source.cutter(&raw)?,
         motion: source.motion(&raw)?,
-        contact: source.choose(
-            raw.digitizing.contact.as_ref(),
-            "contact",
-            Contact::Facet,
-            &CONTACTS,
-        )?,
-        method: source.choose(
-            raw.digitizing.method.as_ref(),
-            "method",
-            Method::Exact,
-            &METHODS,
-        )?,
+        contact,
+        method,
     };
     let checked = job.discretization.validate().and(job.motion.validate());
     checked.map_err(|e| source.core(&raw, e))?;
+    let cluster = source.cluster(&raw)?;
+    source.in_one_process(&raw, method, cluster.workers)?;
     Ok(JobFile {
         files,
         axis,
         job,
-        cluster: source.cluster(&raw)?,
+        cluster,
         program: source.program(&raw)?,
     })
 }
 
 const KINDS: [(&str, MotionKind); 2] = [("helix", MotionKind::Helix), ("rings", MotionKind::Rings)];
 const CONTACTS: [(&str, Contact); 2] = [("facet", Contact::Facet), ("point", Contact::Point)];
-const METHODS: [(&str, Method); 2] = [("exact", Method::Exact), ("brute", Method::Brute)];
+const METHODS: [(&str, Method); 3] = [
+    ("exact", Method::Exact),
+    ("brute", Method::Brute),
+    ("local", Method::Local(LOCAL)),
+];
+/// The local search of a job that says no more.
+const LOCAL: Local = Local {
+    window: None,
+    culling: Culling {
+        back_faces: false,
+        beyond_reach: false,
+    },
+    fallback: true,
+};
 const DISTRIBUTIONS: [(&str, Distribution); 1] = [("overlap", Distribution::Overlap)];
 
 /// The wheels, each with its keys.
@@ -397,6 +411,7 @@ impl Source<'_> {
             horma_core::Error::OutOfBounds { quantity, .. } => quantity,
             horma_core::Error::ConeTooSteep { .. } => "half_angle",
             horma_core::Error::EmptyTravel { .. } => "to",
+            horma_core::Error::LocalNeedsPoints => "method",
             _ => return Error::Core(error),
         };
         self.wrong(raw.at(key), error.to_string())

@@ -5,7 +5,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use horma_core::{Record, ToolPath};
+use horma_core::{Record, ToolPath, Verification};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -23,6 +23,8 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// The path.
     pub path: PathStatistics,
+    /// How the path compares with the designed surface; nothing if that was skipped.
+    pub verification: Option<Verification>,
     /// Phases, bodies, counters, workers, extents and lost attempts, each under its own key.
     #[serde(flatten)]
     pub record: Record,
@@ -114,6 +116,7 @@ mod tests {
             job: serde_json::json!({ "cutter": { "kind": "ball", "radius": 5.0 } }),
             warnings: vec!["last.stl: 3 edges are open".to_owned()],
             path: PathStatistics::of(&path()),
+            verification: None,
             record: Record {
                 phases: vec![Phase {
                     name: "digitize".to_owned(),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use horma_core::{Counters, Extent, ExtentRecord, Plan, SubTrajectory};
+use horma_core::{Extent, ExtentRecord, Plan, SubTrajectory};
 use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::digitize_request::Kind as Request;
 use horma_proto::wire::worker_client::WorkerClient;
@@ -115,10 +115,7 @@ async fn call(attempt: &Attempt, received: &mut SubTrajectory) -> Result<ExtentR
         seconds: begin.elapsed().as_secs_f64(),
         build_seconds: finished.build_seconds,
         digitize_seconds: finished.digitize_seconds,
-        counters: Counters {
-            evaluations: counters.evaluations,
-            nodes: counters.nodes,
-        },
+        counters: horma_proto::counters_from_wire(counters),
     })
 }
 

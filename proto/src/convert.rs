@@ -3,8 +3,8 @@
 
 use bytes::Bytes;
 use horma_core::{
-    Body, Contact, Cutter, Direction, Discretization, Job, Mesh, Method, Motion, MotionKind, Point,
-    Row, RowKind, Shape, Surface, Trajectory,
+    Body, Contact, Counters, Culling, Cutter, Direction, Discretization, Job, Local, Mesh, Method,
+    Motion, MotionKind, Point, Row, RowKind, Shape, Surface, Trajectory, Window,
 };
 
 use crate::error::{Error, Result};
@@ -56,8 +56,10 @@ pub fn job_to_wire(job: &Job) -> wire::Job {
         method: match job.method {
             Method::Exact => wire::Method::Exact,
             Method::Brute => wire::Method::Brute,
+            Method::Local(_) => wire::Method::Local,
         }
         .into(),
+        local: local_to_wire(job.method),
     }
 }
 
@@ -87,7 +89,7 @@ pub fn job_from_wire(job: &wire::Job) -> Result<Job> {
     };
     discretization.validate()?;
     motion.validate()?;
-    Ok(Job {
+    let job = Job {
         discretization,
         cutter,
         motion,
@@ -99,9 +101,63 @@ pub fn job_from_wire(job: &wire::Job) -> Result<Job> {
         method: match job.method() {
             wire::Method::Exact => Method::Exact,
             wire::Method::Brute => Method::Brute,
+            wire::Method::Local => {
+                let local = job.local.ok_or(missing("job", "a window"))?;
+                Method::Local(local_from_wire(local))
+            }
             wire::Method::Unspecified => return Err(missing("job", "a method")),
         },
+    };
+    job.method.validate(job.contact)?;
+    Ok(job)
+}
+
+/// The local search, if that is the method. Workers have its fallback in any case.
+fn local_to_wire(method: Method) -> Option<wire::Local> {
+    let Method::Local(local) = method else {
+        return None;
+    };
+    let window = local.window.unwrap_or(Window::EVERYTHING);
+    Some(wire::Local {
+        delta_u: window.delta_u,
+        delta_v: window.delta_v,
+        back_faces: local.culling.back_faces,
+        beyond_reach: local.culling.beyond_reach,
     })
+}
+
+fn local_from_wire(local: wire::Local) -> Local {
+    Local {
+        window: Some(Window {
+            delta_u: local.delta_u,
+            delta_v: local.delta_v,
+        }),
+        culling: Culling {
+            back_faces: local.back_faces,
+            beyond_reach: local.beyond_reach,
+        },
+        fallback: true,
+    }
+}
+
+/// What searches cost, for the wire.
+pub fn counters_to_wire(counters: Counters) -> wire::Counters {
+    wire::Counters {
+        evaluations: counters.evaluations,
+        nodes: counters.nodes,
+        lost: counters.lost,
+        largest_loss: counters.largest_loss,
+    }
+}
+
+/// What searches cost, from the wire.
+pub fn counters_from_wire(counters: wire::Counters) -> Counters {
+    Counters {
+        evaluations: counters.evaluations,
+        nodes: counters.nodes,
+        lost: counters.lost,
+        largest_loss: counters.largest_loss,
+    }
 }
 
 fn kind_to_wire(kind: MotionKind) -> wire::MotionKind {
@@ -319,7 +375,20 @@ mod tests {
             Cutter::cylinder(20.0, 6.0),
             Cutter::cone(20.0, 6.0, 30.0),
         ] {
-            let job = job(cutter.expect("valid"));
+            let mut job = job(cutter.expect("valid"));
+            assert_eq!(job_from_wire(&job_to_wire(&job)), Ok(job));
+            job.contact = Contact::Point;
+            job.method = Method::Local(Local {
+                window: Some(Window {
+                    delta_u: 8,
+                    delta_v: 20,
+                }),
+                culling: Culling {
+                    back_faces: true,
+                    beyond_reach: false,
+                },
+                fallback: true,
+            });
             assert_eq!(job_from_wire(&job_to_wire(&job)), Ok(job));
         }
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use horma_core::{Counters, Digitizer, Job, Row, Simd, Trajectory};
+use horma_core::{Digitizer, Job, Row, Simd, Trajectory};
 use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::digitize_request::Kind as Request;
 use horma_proto::wire::worker_server::Worker;
@@ -168,9 +168,8 @@ fn digitize(
         let _ = replies.blocking_send(Err(status));
         return;
     }
-    let Counters { evaluations, nodes } = counters;
     let finished = wire::Finished {
-        counters: Some(wire::Counters { evaluations, nodes }),
+        counters: Some(horma_proto::counters_to_wire(counters)),
         build_seconds,
         digitize_seconds: begin.elapsed().as_secs_f64(),
     };

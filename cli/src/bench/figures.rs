@@ -19,7 +19,8 @@ pub(super) struct Figures {
     pub points_per_revolution: u32,
     /// Cores that this process may use.
     pub cores: usize,
-    /// How many of them all programs together kept busy in the minute before, on average.
+    /// How many threads of all programs wanted a core in the minute before, on average: above 0, what
+    /// is measured on several threads suffers, and above their number everything does.
     pub load: f64,
     /// The instruction set, where none is named.
     pub simd: String,

@@ -12,7 +12,7 @@ pub(super) fn text(figures: &Figures) -> String {
     let grid = format!("{rows} × {columns} points a surface");
     let heading = format!(
         "horma {} bench kernel: {}, {}, step {} mm, {} points a revolution\n\
-         {} cores, {:.1} of them busy in the minute before; {}. What is compared was measured in turn,\n\
+         {} cores, {}; load in the minute before: {:.1}. What is compared was measured in turn,\n\
          {turns} times or more; the shortest time counts, and ratios are of these. Checked before measuring:\n\
          exact search finds what brute force finds, and every instruction set and number of threads the\n\
          same path, to the last bit.",
@@ -22,8 +22,8 @@ pub(super) fn text(figures: &Figures) -> String {
         figures.step_mm,
         figures.points_per_revolution,
         figures.cores,
-        figures.load,
         figures.simd,
+        figures.load,
     );
     let sections = [
         heading,

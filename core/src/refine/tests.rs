@@ -147,11 +147,7 @@ fn the_tolerance_holds_between_the_samples() {
             let found = deviation(&surface, &grid.us, &grid.vs);
             let size = (grid.us.len(), grid.vs.len());
             assert!(told <= tolerance, "{name} {tolerance}: {told}");
-            // A peak halfway between samples at quarters is missed by 4 (1/8)², a sixteenth.
-            assert!(
-                found <= 1.0625 * tolerance,
-                "{name} {tolerance}: {found} {size:?}"
-            );
+            assert!(found <= tolerance, "{name} {tolerance}: {found} {size:?}");
         }
     }
 }
@@ -167,20 +163,24 @@ fn halved(lines: &[f64]) -> Vec<f64> {
 fn half_the_lines_in_either_direction_would_not_do() {
     for (name, surface) in all() {
         for tolerance in [0.1, 0.01] {
-            // Creases are lines, needed or not.
-            if name == "linear" {
+            // Creases are lines, needed or not, and half the lines may by chance meet a peak.
+            if name == "linear" || name == "spike" {
                 continue;
             }
             let Lines { us, vs, .. } = refine("s", &surface, tolerance).expect("reachable");
             if us.len() > 2 {
                 let found = deviation(&surface, &halved(&us), &vs);
-                assert!(found > tolerance, "{name} {tolerance}: {} rows", us.len());
+                assert!(
+                    found > SEEN * tolerance,
+                    "{name} {tolerance}: {} rows, {found}",
+                    us.len()
+                );
             }
             if vs.len() > 2 {
                 let found = deviation(&surface, &us, &halved(&vs));
                 assert!(
-                    found > tolerance,
-                    "{name} {tolerance}: {} columns",
+                    found > SEEN * tolerance,
+                    "{name} {tolerance}: {} columns, {found}",
                     vs.len()
                 );
             }

@@ -1,9 +1,9 @@
 //! A job as values again, for the report.
 
-use horma_core::{Axis, Cutter, Discretization};
+use horma_core::{Axis, Cutter, Discretization, Job, Local, Method};
 use serde_json::{Value, json};
 
-use super::{CONTACTS, DISTRIBUTIONS, JobFile, KINDS, METHODS};
+use super::{CONTACTS, DISTRIBUTIONS, JobFile, KINDS};
 
 impl JobFile {
     /// The job in effect, keyed as a job file is, for the report.
@@ -31,16 +31,34 @@ impl JobFile {
                 "from": motion.from,
                 "to": motion.to,
             },
-            "digitizing": {
-                "contact": name_of(&CONTACTS, &self.job.contact),
-                "method": name_of(&METHODS, &self.job.method),
-            },
+            "digitizing": digitizing_echo(&self.job),
             "cluster": {
                 "workers": self.cluster.workers,
                 "distribution": name_of(&DISTRIBUTIONS, &self.cluster.distribution),
             },
             "program": { "feed": self.program.feed, "clearance": self.program.clearance },
         })
+    }
+}
+
+fn digitizing_echo(job: &Job) -> Value {
+    let contact = name_of(&CONTACTS, &job.contact);
+    match job.method {
+        Method::Exact => json!({ "contact": contact, "method": "exact" }),
+        Method::Brute => json!({ "contact": contact, "method": "brute" }),
+        Method::Local(Local {
+            window,
+            culling,
+            fallback,
+        }) => json!({
+            "contact": contact,
+            "method": "local",
+            "delta_u": window.map(|w| w.delta_u),
+            "delta_v": window.map(|w| w.delta_v),
+            "back_face_culling": culling.back_faces,
+            "area_of_influence": culling.beyond_reach,
+            "fallback": fallback,
+        }),
     }
 }
 

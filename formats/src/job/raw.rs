@@ -17,11 +17,25 @@ pub(super) enum At {
     Flag(&'static str),
 }
 
+impl At {
+    /// Whether it is the job file that says so.
+    pub(super) fn in_file(&self) -> bool {
+        matches!(self, Self::File(_))
+    }
+}
+
 /// A value and where it comes from.
 #[derive(Debug)]
 pub(super) struct Given<T> {
     pub(super) value: T,
     pub(super) at: At,
+}
+
+impl<T> Given<T> {
+    /// Whether it is the job file that says so.
+    pub(super) fn in_file(&self) -> bool {
+        self.at.in_file()
+    }
 }
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for Given<T> {
@@ -104,6 +118,11 @@ pub(super) struct RawMotion {
 pub(super) struct RawDigitizing {
     pub(super) contact: Option<Given<String>>,
     pub(super) method: Option<Given<String>>,
+    pub(super) delta_u: Option<Given<i64>>,
+    pub(super) delta_v: Option<Given<i64>>,
+    pub(super) back_face_culling: Option<Given<bool>>,
+    pub(super) area_of_influence: Option<Given<bool>>,
+    pub(super) fallback: Option<Given<bool>>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -155,6 +174,9 @@ impl RawJob {
         );
         put(&mut self.digitizing.contact, "contact", &by.contact);
         put(&mut self.digitizing.method, "method", &by.method);
+        put(&mut self.digitizing.delta_u, "delta_u", &by.delta_u);
+        put(&mut self.digitizing.delta_v, "delta_v", &by.delta_v);
+        put(&mut self.digitizing.fallback, "fallback", &by.fallback);
         put(&mut self.program.feed, "feed", &by.feed);
         put(&mut self.program.clearance, "clearance", &by.clearance);
         if by.tolerance.is_some() {
@@ -186,6 +208,9 @@ impl RawJob {
             "tolerance" => number(&self.discretization.tolerance),
             "rows" => grid.map(|g| &g.rows.at),
             "columns" => grid.map(|g| &g.columns.at),
+            "delta_u" => number(&self.digitizing.delta_u),
+            "delta_v" => number(&self.digitizing.delta_v),
+            "method" => number(&self.digitizing.method),
             "step" => number(&motion?.step),
             "points_per_revolution" => number(&motion?.points_per_revolution),
             "from" => number(&motion?.from),

@@ -1,0 +1,108 @@
+//! Verification: a path held against the designed surface, on its own or at the end of a run.
+
+use horma_core::{Deviation, Discretization, Gouge, Part, Position, Verification, place};
+use horma_formats::job::{self, JobFile};
+use horma_formats::{csv, part};
+
+use crate::args;
+use crate::error::{Error, Result};
+use crate::{say, system};
+
+/// Verifies a path from a file.
+pub(crate) fn verify(args: &args::Verify) -> Result<()> {
+    let file = job::read(&args.job, &job::Overrides::default())?;
+    let rows = csv::read(&args.path)?;
+    let positions: Vec<Position> = rows
+        .iter()
+        .map(|row| Position {
+            x: row.x,
+            angle: row.angle,
+            height: row.height,
+        })
+        .collect();
+    let (part, _) = part::read_all(&file.files)?;
+    let part = place(part, file.axis)?;
+    let threads = args.threads.map_or_else(system::cores, usize::from);
+    let verification = check(&part, &file, &positions, args.spacing, threads)?;
+    if args.json {
+        say(&serde_json::to_string_pretty(&verification).unwrap_or_default());
+    } else {
+        say(&describe(&verification));
+    }
+    let tolerance = args.tolerance.or(tolerance(&file));
+    tolerance.map_or(Ok(()), |tolerance| hold(&verification, tolerance))
+}
+
+/// Verifies positions on `threads` threads.
+pub(crate) fn check(
+    part: &Part,
+    file: &JobFile,
+    positions: &[Position],
+    spacing: Option<f64>,
+    threads: usize,
+) -> Result<Verification> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|e| Error::Threads(e.to_string()))?;
+    let (cutter, step) = (&file.job.cutter, Some(file.job.motion.step));
+    Ok(pool.install(|| horma_core::verify(part, cutter, step, positions, spacing))?)
+}
+
+/// How deep a path may gouge, if the job says so.
+pub(crate) fn tolerance(file: &JobFile) -> Option<f64> {
+    match file.job.discretization {
+        Discretization::Tolerance(tolerance) => Some(tolerance),
+        Discretization::Grid { .. } => None,
+    }
+}
+
+/// Refuses a path that gouges deeper than `tolerance`, mm.
+pub(crate) fn hold(verification: &Verification, tolerance: f64) -> Result<()> {
+    match verification.normal.gouge {
+        Some(gouge) if gouge.depth > tolerance => Err(Error::Gouge {
+            depth: gouge.depth,
+            tolerance,
+            point: gouge.point,
+            position: gouge.position,
+            x: gouge.x,
+            angle: gouge.angle,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// What was found, in words.
+pub(crate) fn describe(verification: &Verification) -> String {
+    let depth = |gouge: &Option<Gouge>| match gouge {
+        None => "none".to_owned(),
+        Some(g) => format!("{:.4} mm at x {:.3}, {:.1}°", g.depth, g.x, g.angle),
+    };
+    let deviation = |name: &str, d: &Deviation| {
+        let excess = match d.excess {
+            None => "nothing reached".to_owned(),
+            Some(e) => format!("{:.4} / {:.4} / {:.4} mm", e.median, e.p99, e.max),
+        };
+        format!(
+            "{name}: deepest gouge {}; on the straight moves between positions {}; excess {excess} (median / 99 % / largest)",
+            depth(&d.gouge),
+            depth(&d.motion_gouge),
+        )
+    };
+    let scallop = match (
+        verification.scallop.measured,
+        verification.scallop.predicted,
+    ) {
+        (Some(measured), Some(predicted)) => {
+            format!("scallop: {measured:.4} mm, {predicted:.4} predicted")
+        }
+        (Some(measured), None) => format!("scallop: {measured:.4} mm"),
+        (None, _) => "scallop: nothing to measure".to_owned(),
+    };
+    format!(
+        "{} samples of the designed surface, {:.2} mm apart; {:.1} % never reached\n{}\n{}\n{scallop}",
+        verification.samples,
+        verification.spacing,
+        100.0 * verification.never_reached,
+        deviation("normal to the surface", &verification.normal),
+        deviation("along the attack axis", &verification.attack),
+    )
+}
