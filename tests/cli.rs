@@ -9,6 +9,12 @@ use common::{job, master, report, run, sample, scratch, succeed, text, texts};
 const GOOD: &str =
     "[cutter]\nkind = \"ball\"\nradius = 8.0\n[motion]\nstep = 20.0\npoints_per_revolution = 12\n";
 
+/// The papers' way: a grid of points, here a coarse one.
+const GRID: &str = "[discretization]\ngrid = { rows = 60, columns = 40 }\n\
+    [digitizing]\ncontact = \"point\"\n\
+    [cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0\n\
+    [motion]\nstep = 5.0\npoints_per_revolution = 36\n";
+
 /// The command fails with this exit code, one message that has all of these words, and nothing on
 /// standard output.
 fn check(args: &[&str], code: i32, words: &[&str]) {
@@ -297,9 +303,20 @@ fn the_sample_is_written_runs_and_is_not_overwritten() {
             "{name}: {said}"
         );
     }
-    for phase in ["read", "discretize", "digitize", "stitch", "write"] {
+    for phase in [
+        "read",
+        "discretize",
+        "digitize",
+        "stitch",
+        "verify",
+        "write",
+    ] {
         assert!(progress.contains(phase), "{phase}: {progress}");
     }
+    assert!(
+        said.contains("deepest gouge") && said.contains("scallop"),
+        "{said}"
+    );
     let report = report(&out);
     assert_eq!(report["bodies"].as_array().map(Vec::len), Some(3));
     assert_eq!(report["job"]["motion"]["step"], 10.0);
@@ -340,6 +357,128 @@ fn variables_lie_between_flags_and_file() {
     };
     assert_eq!(step_with(&[]), Some(30.0));
     assert_eq!(step_with(&["--step", "40"]), Some(40.0));
+}
+
+#[test]
+fn a_path_is_held_against_the_designed_surface() {
+    let dir = scratch();
+    let part = sample().with_file_name("last.step");
+    let job = job(dir.path(), "job.toml", &[&part], GOOD);
+    let out = dir.path().join("out");
+    let coarse = ["--points-per-revolution", "90", "--tolerance", "0.05"];
+    let run_with = |more: &[&str]| {
+        let mut all = vec!["run", text(&job), "-o", text(&out), "-q"];
+        all.extend(coarse);
+        all.extend(more);
+        run(&all)
+    };
+    // Facets hold the tolerance, points sink between each other and do not.
+    assert!(run_with(&[]).status.success());
+    let depth = |report: &serde_json::Value| report["normal"]["gouge"]["depth"].as_f64();
+    let verification = &report(&out)["verification"];
+    assert!(
+        depth(verification).is_none_or(|d| d <= 0.05),
+        "{verification}"
+    );
+    assert!(verification["normal"]["motion_gouge"]["depth"].as_f64() > Some(0.0));
+    let points = run_with(&["--contact", "point"]);
+    let (_, err) = texts(&points);
+    assert_eq!(points.status.code(), Some(3), "{err}");
+    assert!(
+        err.contains("gouges the part by") && err.contains("travel"),
+        "{err}"
+    );
+    assert!(
+        run_with(&["--contact", "point", "--no-verify"])
+            .status
+            .success()
+    );
+    assert!(report(&out)["verification"].is_null());
+
+    // A path from anywhere: this one, advanced by half a millimetre and without its contacts.
+    let deeper = |line: &str| {
+        let fields: Vec<&str> = line.split(',').collect();
+        match fields[3].parse::<f64>() {
+            Ok(y) => format!("{},{},{},{},,,", fields[0], fields[1], fields[2], y - 0.5),
+            Err(_) => line.to_owned(),
+        }
+    };
+    let path = std::fs::read_to_string(out.join("path.csv")).expect("a path");
+    let path: Vec<String> = path.lines().map(deeper).collect();
+    let path = file(dir.path(), "deeper.csv", path.join("\n").as_bytes());
+    let verify = |more: &[&str]| {
+        let mut all = vec!["verify", text(&path), text(&job)];
+        all.extend(more);
+        run(&all)
+    };
+    assert_eq!(verify(&[]).status.code(), Some(3));
+    let json = verify(&["--json", "--tolerance", "9"]);
+    assert!(json.status.success());
+    let found: serde_json::Value = serde_json::from_slice(&json.stdout).expect("JSON");
+    assert!(depth(&found) > Some(0.4), "{found}");
+}
+
+#[test]
+fn the_local_search_tells_its_windows_and_what_it_lost() {
+    let dir = scratch();
+    let part = sample().with_file_name("last.step");
+    let job = job(dir.path(), "job.toml", &[&part], GRID);
+    let run_with = |name: &str, more: &[&str]| {
+        let out = dir.path().join(name);
+        let mut all = vec!["run", text(&job), "-o", text(&out), "-q", "--no-verify"];
+        all.extend(more);
+        succeed(&all);
+        (
+            std::fs::read(out.join("path.csv")).expect("a path"),
+            report(&out),
+        )
+    };
+    let local = |more: &[&'static str]| [&["--method", "local"], more].concat();
+    let window = |report: &serde_json::Value, key: &str| report["window"][key].as_u64();
+    let (exact, _) = run_with("exact", &[]);
+    let (found, report) = run_with("found", &local(&[]));
+    assert_eq!(report["counters"]["lost"], 0);
+    assert!(window(&report, "delta_u") > Some(0) && window(&report, "delta_v") > Some(1));
+    assert!(found == exact);
+    let given = local(&["--delta-u", "2", "--delta-v", "2"]);
+    let (fallen_back, report) = run_with("given", &given);
+    assert!(fallen_back == exact);
+    assert!(report["counters"]["lost"].as_u64() > Some(0));
+    let (on_workers, _) = run_with("workers", &[given.clone(), vec!["--workers", "2"]].concat());
+    assert!(on_workers == exact);
+    let (wrong, report) = run_with("wrong", &[given, vec!["--no-fallback"]].concat());
+    assert!(wrong != exact);
+    assert!(report["counters"]["largest_loss"].as_f64() > Some(0.0));
+
+    let out = dir.path().join("refused");
+    let refused: [(&[&str], &[&str]); 4] = [
+        (&["--workers", "2"], &["one process", "workers"]),
+        (&["--delta-u", "8"], &["delta_u and delta_v"]),
+        (&["--contact", "facet"], &["contact", "point"]),
+        (&["--delta-u", "0", "--delta-v", "9"], &["delta_u is 0"]),
+    ];
+    for (more, words) in refused {
+        let mut all = vec!["run", text(&job), "-o", text(&out), "--method", "local"];
+        all.extend(more);
+        check(&all, 2, words);
+    }
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bytes() {
+    let dir = scratch();
+    let part = sample().with_file_name("last.step");
+    let job = job(dir.path(), "job.toml", &[&part], GOOD);
+    let path = |simd: &str| common::path_of(&job, dir.path(), simd, &["--simd", simd]);
+    let scalar = path("scalar");
+    for simd in horma_core::Simd::available() {
+        assert!(path(&simd.to_string()) == scalar, "{simd}");
+    }
+    let out = dir.path().join("out");
+    let unknown = run(&["run", text(&job), "-o", text(&out), "--simd", "mmx"]);
+    let (_, err) = texts(&unknown);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(err.contains("mmx") && err.contains("scalar"), "{err}");
 }
 
 #[test]

@@ -305,8 +305,8 @@ impl View {
             x: x as f32,
             cos: pose.cos as f32,
             sin: pose.sin as f32,
-            // Six roundings of half a unit each, at most; the slopes' own are counted where they are.
-            rounding: f32::EPSILON * 4.0 * size as f32,
+            // Some ten roundings of half a unit each at most, and as much again.
+            rounding: f32::EPSILON * 8.0 * size as f32,
         }
     }
 }

@@ -407,12 +407,16 @@ fn band(p: f64, s: f64, h: f64) -> (f64, f64) {
 #[inline(always)]
 fn disc(p: [f64; 2], s: [f64; 2], r: f64) -> (f64, f64) {
     let square = s[0] * s[0] + s[1] * s[1];
-    let c = p[0] * p[0] + p[1] * p[1] - r * r;
     if square == 0.0 {
-        return if c <= 0.0 { EVERYWHERE } else { NOWHERE };
+        let within = p[0] * p[0] + p[1] * p[1] <= r * r;
+        return if within { EVERYWHERE } else { NOWHERE };
     }
     let half = p[0] * s[0] + p[1] * s[1];
-    let discriminant = half * half - square * c;
+    // How far the line passes from the origin, times its length: `half² − square·c` would be the same,
+    // but of an edge that comes from afar nothing would be left of it, and rows out of reach are not
+    // searched everywhere.
+    let apart = p[0] * s[1] - p[1] * s[0];
+    let discriminant = square * (r * r) - apart * apart;
     if discriminant < 0.0 {
         return NOWHERE;
     }
@@ -535,5 +539,28 @@ mod tests {
         let touch = touch_facet(&torus, &pose, corners).expect("in reach");
         assert_eq!(touch.height, 58.0);
         assert!(length(sub(touch.contact, [0.0, 10.0, 0.0])) < 1e-12);
+    }
+
+    #[test]
+    fn an_edge_from_afar_is_not_touched_out_of_reach() {
+        let pose = Pose {
+            x: 0.0,
+            cos: 1.0,
+            sin: 0.0,
+        };
+        for (long, radius) in [(300.0, 8.0), (1.0e4, 8.0), (1.0e4, 0.5), (1.0e5, 0.5)] {
+            let ball = Cutter::ball(radius).expect("valid");
+            for degree in 0..360 {
+                let angle = f64::from(degree).to_radians();
+                let (u, v) = (libm::cos(angle), libm::sin(angle));
+                let at = |r: f64, y: f64| [r * u, y, r * v];
+                for gap in [1.0e-9, 1.0e-8] {
+                    let tip = at(radius + gap, 10.0);
+                    let corners = [tip, at(long, 0.0), at(long, -5.0)];
+                    let touch = touch_facet(&ball, &pose, corners);
+                    assert_eq!(touch, None, "{long}, {radius}, {degree}");
+                }
+            }
+        }
     }
 }

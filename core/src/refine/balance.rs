@@ -143,7 +143,8 @@ fn settle(bends: &Bends, v: &[f64], floor_u: &[f64], least: &[f64]) -> Densities
     let mut v = least.to_vec();
     // As `needed`, with the directions exchanged; a row of u at a time, since v lies together.
     for (k, &density) in u.iter().enumerate() {
-        let x = 1.0 / density;
+        // A hair smaller: where only u bends it takes the whole budget, and nothing is left to divide by.
+        let x = 0.999 / density;
         for (l, v) in v.iter_mut().enumerate() {
             let i = k * n + l;
             let needed = density_needed(bends.v[i], bends.u[i], bends.twist[i], bends.both[i], x);

@@ -249,3 +249,40 @@ fn an_unreachable_tolerance_is_refused() {
     };
     assert!(deviation > 1e-6);
 }
+
+/// On top of a torus the surface bends in one direction only, so that it takes the whole budget.
+#[test]
+fn a_torus_of_revolution_is_refined() {
+    let s = std::f64::consts::FRAC_1_SQRT_2;
+    // A full circle of four quarters: poles on a square, with its corners weighted.
+    let square = [
+        [1.0, 0.0],
+        [1.0, 1.0],
+        [0.0, 1.0],
+        [-1.0, 1.0],
+        [-1.0, 0.0],
+        [-1.0, -1.0],
+        [0.0, -1.0],
+        [1.0, -1.0],
+        [1.0, 0.0],
+    ];
+    let weight = |i: usize| if i % 2 == 1 { s } else { 1.0 };
+    let knots = vec![0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 4.0, 4.0, 4.0];
+    let direction = || Direction {
+        degree: 2,
+        knots: knots.clone(),
+    };
+    let (mut poles, mut weights) = (Vec::new(), Vec::new());
+    for (i, [along, out]) in square.into_iter().enumerate() {
+        for (j, [y, z]) in square.into_iter().enumerate() {
+            let radius = 30.0 + 10.0 * out;
+            poles.push([10.0 * along, radius * y, radius * z]);
+            weights.push(weight(i) * weight(j));
+        }
+    }
+    let torus = Surface::new("t", direction(), direction(), poles, Some(weights)).expect("valid");
+    for tolerance in [0.1, 0.005] {
+        let grid = refine("t", &torus, tolerance).expect("reachable");
+        assert!(grid.deviation.expect("measured") <= tolerance);
+    }
+}

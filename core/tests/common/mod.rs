@@ -1,7 +1,7 @@
 //! Random parts and jobs, from bytes: what the property test and the fuzz target both feed on.
 //!
-//! Every string of bytes is a case, a prefix of zeros for what is missing, so that shrinking bytes
-//! shrinks cases. The bytes decide what there is and how large; where the noise falls comes from
+//! Almost every string of bytes is a case, with zeros for what is missing, so that shrinking bytes shrinks
+//! cases. The bytes decide what there is and how large; where the noise falls comes from
 //! a generator that they seed. Numbers are often rounded to eighths: only then are heights equal, and
 //! ties are what the lowest candidate has to win.
 
@@ -414,9 +414,7 @@ fn stepped(dice: &mut Dice) -> Net {
         let r = 8.0 + 6.0 * noise.signed();
         profile.extend([(6.0 * i as f64, r), (6.0 * (i + 1) as f64, r)]);
     }
-    let lathe = |x: f64, j: usize| (x, j);
     revolve(&profile, sides, |(x, r), j| {
-        let (x, j) = lathe(x, j);
         let angle = std::f64::consts::TAU * j as f64 / sides as f64;
         [x, r * angle.cos(), r * angle.sin()]
     })
