@@ -526,3 +526,24 @@ fn help_teaches_and_completions_complete() {
         assert!(succeed(&["completions", shell]).contains("horma"));
     }
 }
+
+#[test]
+fn a_bench_prints_its_table_and_leaves_others_results_alone() {
+    let dir = scratch();
+    let out = dir.path().join("bench");
+    let said = succeed(&["bench", "kernel", "-o", text(&out), "--quick", "-q"]);
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
+    assert_eq!(said, read("kernel.txt"));
+    assert!(said.contains("the sample last"), "{said}");
+    let figures: serde_json::Value = serde_json::from_str(&read("kernel.json")).expect("JSON");
+    for density in figures["density"].as_array().expect("densities") {
+        let ratio = density["point"]["brute_over_exact"].as_f64();
+        assert!(ratio.is_some_and(|r| r > 1.0), "{density}");
+    }
+    assert!(read("kernel.svg").ends_with("</svg>\n"));
+    std::fs::rename(out.join("kernel.txt"), out.join("path.csv")).expect("renamed");
+    check(&["bench", "kernel", "-o", text(&out)], 2, &["path.csv"]);
+    let missing = dir.path().join("missing.toml");
+    let bench = ["bench", "kernel", text(&missing), "-o", text(&out)];
+    check(&bench, 2, &["missing.toml"]);
+}

@@ -68,6 +68,9 @@ pub(crate) enum Command {
         #[arg(required = true)]
         files: Vec<PathBuf>,
     },
+    /// Measure on this machine what the searches cost
+    #[command(subcommand)]
+    Bench(Bench),
     /// Print shell completions
     Completions {
         /// bash, zsh, fish, elvish or powershell
@@ -255,6 +258,41 @@ impl Job {
             clearance: self.clearance,
         }
     }
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Bench {
+    /// Measure the searches: cost per position, and ratios from one run
+    ///
+    /// Exact against brute force and facets against points from ten thousand to ten million points,
+    /// instruction sets, threads, numbers of positions and two wheels. What is compared is measured in
+    /// turn, and the shortest of the repetitions counts. On the way it checks that instruction sets,
+    /// threads and brute force give the same path to the last bit. Close other programs first; the
+    /// full bench takes a few minutes.
+    #[command(after_help = "\
+Examples:
+  horma bench kernel -o bench --quick     the sample last, in a few seconds
+  horma bench kernel job.toml -o bench    your part, cutter and motion
+
+Of a job, its part, cutter and motion are taken; the grid, the contact and the method are what is
+varied.")]
+    Kernel(BenchKernel),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchKernel {
+    /// The job file (TOML) [default: the sample that `horma init` writes]
+    #[arg(value_name = "JOB")]
+    pub job: Option<PathBuf>,
+    /// Directory for kernel.txt, kernel.json and kernel.svg
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Up to a hundred thousand points only, and fewer repetitions
+    #[arg(long)]
+    pub quick: bool,
+    /// Show no progress, only the table
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 #[derive(Debug, Args)]

@@ -41,6 +41,14 @@ pub(crate) enum Error {
     JobFailed { address: String, reason: String },
     #[error("the master at {address} sent a path that cannot be right: {reason}")]
     BadReply { address: String, reason: String },
+    #[error(
+        "{what} gave another path than {than}: position {position} of those measured differs; please report this with the job"
+    )]
+    Differs {
+        what: String,
+        than: &'static str,
+        position: usize,
+    },
     #[error("the path gouges the part by {depth:.4} mm, more than the tolerance of {tolerance} mm, at [{:.3}, {:.3}, {:.3}] of the part (position {position}: travel {x:.3}, angle {angle:.2}°); digitize facets (contact = \"facet\") to a finer tolerance, or skip the verification with --no-verify", point[0], point[1], point[2])]
     Gouge {
         depth: f64,
@@ -67,6 +75,7 @@ impl Error {
             Self::Core(e) | Self::Formats(horma_formats::Error::Core(e)) => of_core(e),
             Self::Formats(horma_formats::Error::NoContact { .. })
             | Self::Impossible { .. }
+            | Self::Differs { .. }
             | Self::Gouge { .. } => 3,
             Self::Master(horma_master::Error::Plan(e)) => of_core(e),
             Self::Formats(_)

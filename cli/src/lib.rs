@@ -12,6 +12,7 @@ mod here;
 mod submit;
 mod verify;
 
+mod bench;
 mod inspect;
 mod serve;
 
@@ -19,6 +20,7 @@ mod progress;
 mod system;
 
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -35,7 +37,21 @@ pub fn main() -> ExitCode {
         .with_writer(std::io::stderr)
         .with_ansi(false)
         .init();
-    match execute(arguments) {
+    exit_code(execute(arguments))
+}
+
+/// Measures the kernel on the sample, quickly: what `cargo bench` runs. Results go to `output`.
+pub fn bench_kernel(output: &Path) -> ExitCode {
+    exit_code(bench::kernel(&args::BenchKernel {
+        job: None,
+        output: output.to_owned(),
+        quick: true,
+        quiet: false,
+    }))
+}
+
+fn exit_code(ended: Result<()>) -> ExitCode {
+    match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(Error::Interrupted) => ExitCode::from(Error::Interrupted.exit_code()),
         Err(error) => {
@@ -55,6 +71,7 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Worker(worker) => serve::worker(worker),
         Command::Init { directory } => inspect::init(&directory),
         Command::Inspect { files } => inspect::inspect(&files),
+        Command::Bench(args::Bench::Kernel(bench)) => bench::kernel(&bench),
         Command::Completions { shell } => {
             args::print_completions(shell);
             Ok(())

@@ -18,6 +18,11 @@ pub(crate) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
+/// Threads of all programs that wanted a core in the last minute, on average; 0 where nobody counts.
+pub(crate) fn load() -> f64 {
+    System::load_average().map_or(0.0, |load| load.one)
+}
+
 /// A name for this process that differs from others' on this and other machines.
 pub(crate) fn process_name() -> String {
     let host = System::host_name().unwrap_or_else(|_| "host".to_owned());

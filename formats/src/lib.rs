@@ -17,6 +17,7 @@ pub mod output;
 
 pub mod csv;
 pub mod gcode;
+pub mod plot;
 pub mod preview;
 pub mod report;
 

@@ -19,6 +19,15 @@ pub const PROGRAM: &str = "path.ngc";
 /// The picture.
 pub const PREVIEW: &str = "preview.png";
 
+/// Every name that a bench of the kernel may give a file of its output directory.
+pub const BENCH_FILES: [&str; 3] = [BENCH_TABLE, BENCH_FIGURES, BENCH_PLOT];
+/// The bench's table.
+pub const BENCH_TABLE: &str = "kernel.txt";
+/// The bench's figures.
+pub const BENCH_FIGURES: &str = "kernel.json";
+/// The bench's diagram.
+pub const BENCH_PLOT: &str = "kernel.svg";
+
 /// Begins the name of a file that is still being written.
 const UNFINISHED: &str = ".horma-";
 
@@ -29,6 +38,14 @@ const UNFINISHED: &str = ".horma-";
 /// [`Error::NotADirectory`], [`Error::ForeignDirectory`] if it holds anything else, [`Error::Io`]
 /// if it cannot be created, read or written.
 pub fn prepare_dir(dir: &Path) -> Result<()> {
+    prepare_dir_of(dir, &FILES)
+}
+
+/// The same for results of these names.
+///
+/// # Errors
+/// Those of [`prepare_dir`].
+pub fn prepare_dir_of(dir: &Path, files: &[&str]) -> Result<()> {
     let io = |source| Error::io(dir, source);
     if dir.exists() && !dir.is_dir() {
         return Err(Error::NotADirectory {
@@ -39,7 +56,7 @@ pub fn prepare_dir(dir: &Path) -> Result<()> {
     for entry in fs::read_dir(dir).map_err(io)? {
         let name = entry.map_err(io)?.file_name();
         let name = name.to_string_lossy();
-        if !FILES.contains(&&*name) && !name.starts_with(UNFINISHED) {
+        if !files.contains(&&*name) && !name.starts_with(UNFINISHED) {
             return Err(Error::ForeignDirectory {
                 path: dir.to_owned(),
                 entry: name.into_owned(),
@@ -54,6 +71,7 @@ pub fn prepare_dir(dir: &Path) -> Result<()> {
 /// are published, all at once.
 #[derive(Debug)]
 pub struct Staging {
+    files: &'static [&'static str],
     dir: PathBuf,
     staged: TempDir,
 }
@@ -64,15 +82,24 @@ impl Staging {
     /// # Errors
     /// [`Error::Io`] if nothing can be created there.
     pub fn begin(dir: &Path) -> Result<Self> {
+        Self::begin_of(dir, &FILES)
+    }
+
+    /// Begins results of these names for `dir`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if nothing can be created there.
+    pub fn begin_of(dir: &Path, files: &'static [&'static str]) -> Result<Self> {
         let mut builder = tempfile::Builder::new();
         let staged = builder.prefix(UNFINISHED).tempdir_in(dir);
         Ok(Self {
+            files,
             dir: dir.to_owned(),
             staged: staged.map_err(|source| Error::io(dir, source))?,
         })
     }
 
-    /// Where to write the result called `name`, one of [`FILES`].
+    /// Where to write the result called `name`, one of those that were begun.
     pub fn file(&self, name: &str) -> PathBuf {
         self.staged.path().join(name)
     }
@@ -83,7 +110,7 @@ impl Staging {
     /// # Errors
     /// [`Error::Io`], naming the file.
     pub fn publish(self) -> Result<()> {
-        for name in FILES {
+        for name in self.files {
             let target = self.dir.join(name);
             let moved = match self.file(name) {
                 staged if staged.exists() => fs::rename(staged, &target),

@@ -1,0 +1,278 @@
+//! Diagrams out: curves over two logarithmic axes, as SVG.
+//!
+//! The picture brings its own background and follows the reader's choice of light or dark. Text is
+//! text, in the reader's font; nothing is computed about the curves.
+
+use std::fmt::Write;
+
+/// A diagram.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plot {
+    /// What it shows.
+    pub title: String,
+    /// Of what, and how it came about.
+    pub subtitle: String,
+    /// What the horizontal axis counts, with its unit.
+    pub x: String,
+    /// What the vertical axis measures, with its unit.
+    pub y: String,
+    /// The curves, in the order of the legend.
+    pub curves: Vec<Curve>,
+}
+
+/// A curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// Its name in the legend.
+    pub name: String,
+    /// Its colour, a number below [`COLORS`].
+    pub color: usize,
+    /// Whether the line is broken.
+    pub dashed: bool,
+    /// Points, from left to right; only positive ones can be shown.
+    pub points: Vec<[f64; 2]>,
+}
+
+/// Number of colours that a curve can have.
+pub const COLORS: usize = 2;
+
+/// Size of the picture, and the frame in it: left, top, right, bottom.
+const SIZE: [f64; 2] = [720.0, 480.0];
+const FRAME: [f64; 4] = [72.0, 112.0, 696.0, 424.0];
+
+const STYLE: &str = "\
+text{font-family:system-ui,sans-serif;font-size:13px;fill:#24292f}\
+.title{font-size:17px;font-weight:600}.minor{fill:#57606a}\
+.paper{fill:#ffffff}.grid{stroke:#d8dee4;fill:none}.frame{stroke:#57606a;fill:none}\
+.curve{fill:none;stroke-width:2.2;stroke-linejoin:round}.dashed{stroke-dasharray:7 4}\
+.c0{stroke:#0969da}.c1{stroke:#bc4c00}.d0{fill:#0969da}.d1{fill:#bc4c00}\
+@media (prefers-color-scheme:dark){\
+text{fill:#e6edf3}.minor{fill:#9da7b3}.paper{fill:#0d1117}.grid{stroke:#30363d}.frame{stroke:#9da7b3}\
+.c0{stroke:#58a6ff}.c1{stroke:#f0883e}.d0{fill:#58a6ff}.d1{fill:#f0883e}}";
+
+/// Draws a diagram.
+pub fn svg(plot: &Plot) -> String {
+    let [width, height] = SIZE;
+    let [left, top, right, bottom] = FRAME;
+    let mut out = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
+         width=\"{width}\" height=\"{height}\" role=\"img\">\n\
+         <title>{}</title>\n<style>{STYLE}</style>\n\
+         <rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\n",
+        escaped(&plot.title)
+    );
+    text(&mut out, "title", "start", [left, 32.0], &plot.title);
+    text(&mut out, "minor", "start", [left, 53.0], &plot.subtitle);
+    let values = |k: usize| {
+        let points = plot.curves.iter().flat_map(|c| &c.points);
+        points.map(move |p| p[k]).filter(|v| shown(*v))
+    };
+    let x = Axis::over(values(0), [left, right]);
+    let y = Axis::over(values(1), [bottom, top]);
+    for decade in x.decades() {
+        let at = x.decade(decade);
+        line(&mut out, "grid", [at, top], [at, bottom]);
+        let label = power(decade);
+        text(&mut out, "minor", "middle", [at, bottom + 20.0], &label);
+    }
+    for decade in y.decades() {
+        let at = y.decade(decade);
+        line(&mut out, "grid", [left, at], [right, at]);
+        let label = power(decade);
+        text(&mut out, "minor", "end", [left - 8.0, at + 4.5], &label);
+    }
+    let (wide, high) = (right - left, bottom - top);
+    push(
+        &mut out,
+        format_args!(
+            "<rect class=\"frame\" x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\"/>\n"
+        ),
+    );
+    let middle = [(left + right) / 2.0, (top + bottom) / 2.0];
+    text(&mut out, "", "middle", [middle[0], height - 14.0], &plot.x);
+    push(
+        &mut out,
+        format_args!(
+            "<text text-anchor=\"middle\" transform=\"translate(22 {}) rotate(-90)\">{}</text>\n",
+            middle[1],
+            escaped(&plot.y)
+        ),
+    );
+    legend(&mut out, plot);
+    for curve in &plot.curves {
+        let shown = curve.points.iter().filter(|p| p.iter().all(|v| shown(*v)));
+        let places: Vec<[f64; 2]> = shown.map(|p| [x.place(p[0]), y.place(p[1])]).collect();
+        draw(&mut out, curve, &places);
+    }
+    out.push_str("</svg>\n");
+    out
+}
+
+/// Whether a logarithmic axis can show it.
+fn shown(value: f64) -> bool {
+    value > 0.0 && value.is_finite()
+}
+
+/// A logarithmic axis over whole decades.
+struct Axis {
+    low: i32,
+    high: i32,
+    ends: [f64; 2],
+}
+
+impl Axis {
+    fn over(values: impl Iterator<Item = f64>, ends: [f64; 2]) -> Self {
+        let span = values.fold(None, |span: Option<(f64, f64)>, v| {
+            Some(span.map_or((v, v), |(low, high)| (low.min(v), high.max(v))))
+        });
+        let (low, high) = span.unwrap_or((1.0, 10.0));
+        // A hair beyond a decade does not ask for another one.
+        let low = (low.log10() + 0.02).floor() as i32;
+        let high = (high.log10() - 0.02).ceil() as i32;
+        Self {
+            low,
+            high: high.max(low + 1),
+            ends,
+        }
+    }
+
+    fn decades(&self) -> std::ops::RangeInclusive<i32> {
+        self.low..=self.high
+    }
+
+    fn place(&self, value: f64) -> f64 {
+        self.at(value.log10())
+    }
+
+    fn decade(&self, decade: i32) -> f64 {
+        self.at(f64::from(decade))
+    }
+
+    fn at(&self, exponent: f64) -> f64 {
+        let share = (exponent - f64::from(self.low)) / f64::from(self.high - self.low);
+        self.ends[0] + (self.ends[1] - self.ends[0]) * share
+    }
+}
+
+/// A power of ten: in full if it is short.
+fn power(exponent: i32) -> String {
+    const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    if (-2..=3).contains(&exponent) {
+        return 10f64.powi(exponent).to_string();
+    }
+    let sign = if exponent < 0 { "⁻" } else { "" };
+    let digits = exponent.unsigned_abs().to_string();
+    let raised = digits.bytes().map(|d| RAISED[usize::from(d - b'0')]);
+    format!("10{sign}{}", raised.collect::<String>())
+}
+
+/// Two curves above each other, then the next two.
+fn legend(out: &mut String, plot: &Plot) {
+    let [left, top, ..] = FRAME;
+    for (k, curve) in plot.curves.iter().enumerate() {
+        let x = left + 190.0 * (k / 2) as f64;
+        let y = top - 38.0 + 20.0 * (k % 2) as f64;
+        draw(out, curve, &[[x, y], [x + 34.0, y]]);
+        text(out, "", "start", [x + 42.0, y + 4.5], &curve.name);
+    }
+}
+
+fn draw(out: &mut String, curve: &Curve, places: &[[f64; 2]]) {
+    let color = curve.color % COLORS;
+    let dashed = if curve.dashed { " dashed" } else { "" };
+    let line = places.iter().map(|[x, y]| format!("{x:.1},{y:.1}"));
+    let line = line.collect::<Vec<_>>().join(" ");
+    push(
+        out,
+        format_args!("<polyline class=\"curve c{color}{dashed}\" points=\"{line}\"/>\n"),
+    );
+    for [x, y] in places {
+        push(
+            out,
+            format_args!("<circle class=\"d{color}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\"/>\n"),
+        );
+    }
+}
+
+fn line(out: &mut String, class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) {
+    push(
+        out,
+        format_args!(
+            "<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>\n"
+        ),
+    );
+}
+
+fn text(out: &mut String, class: &str, anchor: &str, [x, y]: [f64; 2], content: &str) {
+    let content = escaped(content);
+    push(
+        out,
+        format_args!(
+            "<text class=\"{class}\" text-anchor=\"{anchor}\" x=\"{x:.1}\" y=\"{y:.1}\">{content}</text>\n"
+        ),
+    );
+}
+
+fn push(out: &mut String, what: std::fmt::Arguments) {
+    // A string takes everything.
+    let _ = out.write_fmt(what);
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plot(points: Vec<[f64; 2]>) -> String {
+        svg(&Plot {
+            title: "a < b & c".to_owned(),
+            subtitle: String::new(),
+            x: "points".to_owned(),
+            y: "µs".to_owned(),
+            curves: vec![Curve {
+                name: "exact".to_owned(),
+                color: 1,
+                dashed: true,
+                points,
+            }],
+        })
+    }
+
+    #[test]
+    fn decades_span_the_frame() {
+        let [left, top, right, bottom] = FRAME;
+        let drawn = plot(vec![[1.0e4, 0.1], [1.0e5, 1.0], [1.0e6, 10.0]]);
+        let (x, y) = ((left + right) / 2.0, (top + bottom) / 2.0);
+        let line = format!("{left:.1},{bottom:.1} {x:.1},{y:.1} {right:.1},{top:.1}");
+        assert!(drawn.contains(&line), "{drawn}");
+        assert!(
+            drawn.contains(">10⁶<") && drawn.contains(">0.1<"),
+            "{drawn}"
+        );
+        assert!(drawn.contains("a &lt; b &amp; c") && drawn.contains("dashed"));
+    }
+
+    #[test]
+    fn nothing_and_what_has_no_logarithm_are_drawn_too() {
+        for points in [
+            vec![],
+            vec![[10.0, 5.0]],
+            vec![[0.0, -1.0], [1.0, f64::NAN]],
+        ] {
+            let drawn = plot(points);
+            assert!(!drawn.contains("NaN") && !drawn.contains("inf"), "{drawn}");
+            assert!(drawn.ends_with("</svg>\n"));
+        }
+    }
+
+    #[test]
+    fn powers_of_ten_are_written_as_people_do() {
+        let written = [-3, -2, 0, 3, 4, 12].map(power);
+        assert_eq!(written, ["10⁻³", "0.01", "1", "1000", "10⁴", "10¹²"]);
+    }
+}
