@@ -200,8 +200,8 @@ fn keys_and_choices_that_are_unknown_are_refused_with_the_known_ones() {
     );
     refused(
         "\"brute\"",
-        "\"local\"",
-        "unknown method 'local'; known: exact, brute",
+        "\"fast\"",
+        "unknown method 'fast'; known: exact, brute, local",
     );
     refused(
         "\"overlap\"",
