@@ -9,7 +9,11 @@ pub(super) fn text(figures: &Figures) -> String {
         turns,
         ..
     } = figures;
-    let grid = format!("{rows} × {columns} points a surface");
+    let grid = if figures.density.iter().any(|d| d.grid.is_none()) {
+        "the mesh as it is".to_owned()
+    } else {
+        format!("{rows} × {columns} points a surface")
+    };
     let heading = format!(
         "horma {} bench kernel: {}, {}, step {} mm, {} points a revolution\n\
          {} cores, {}; load in the minute before: {:.1}. What is compared was measured in turn,\n\
