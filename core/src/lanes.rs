@@ -1,6 +1,6 @@
 //! Contact with points, eight at a time.
 //!
-//! The same sequence of + − × ÷ √ as [`crate::contact::touch_point`], lane by lane, so that the heights
+//! The same sequence of + − × ÷ √ as `touch_point` in `contact`, lane by lane, so that the heights
 //! are the same bits. Nothing is multiplied and added in one step, and nothing depends on the other
 //! lanes.
 
