@@ -58,8 +58,10 @@ pub(crate) enum Error {
         x: f64,
         angle: f64,
     },
-    #[error("{what}, which takes one process; use `horma run` without workers")]
-    OneProcess { what: &'static str },
+    #[error(
+        "without its fallback, or without delta_u and delta_v, the local search goes over the whole path in one process; use `horma run` without workers"
+    )]
+    OneProcess,
     #[error("cannot start threads: {0}")]
     Threads(String),
     #[error("interrupted")]
@@ -83,7 +85,7 @@ impl Error {
             | Self::Exposed { .. }
             | Self::Address { .. }
             | Self::Refused { .. }
-            | Self::OneProcess { .. }
+            | Self::OneProcess
             | Self::Worker(horma_worker::Error::Address { .. }) => 2,
             Self::Master(_)
             | Self::Worker(_)

@@ -22,9 +22,7 @@ pub(crate) fn run(
     display: &Display,
     stop: &CancellationToken,
 ) -> Result<Outcome> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|e| Error::Threads(e.to_string()))?;
-    pool.install(|| pipeline(part, job, simd, display, stop))
+    system::pool(threads)?.install(|| pipeline(part, job, simd, display, stop))
 }
 
 fn pipeline(
@@ -46,40 +44,41 @@ fn pipeline(
     let plan = Plan::new(part, job, system::memory())?;
     timed("discretize", begin);
 
-    let (job, heuristic) = match job.method {
-        Method::Local(local) if local.window.is_none() || !local.fallback => {
+    let (path, counters, window) = match job.method {
+        Method::Local(local) if local.needs_whole_path() => {
             display.tell("find the window", 0, 0);
             let begin = Instant::now();
             let rows = &plan.model.rows;
             let heuristic = Heuristic::new(&job, local, rows, &plan.trajectory, simd);
             let window = local.window.unwrap_or_else(|| heuristic.smallest_window());
             timed("find the window", begin);
-            let window = Some(window);
-            let method = Method::Local(Local { window, ..local });
-            (
-                Job { method, ..job },
-                (!local.fallback).then_some(heuristic),
-            )
-        }
-        _ => (job, None),
-    };
-    let window = match job.method {
-        Method::Local(local) => local.window,
-        Method::Exact | Method::Brute => None,
-    };
-    let (path, counters) = match (heuristic, window) {
-        (Some(heuristic), Some(window)) => {
-            display.tell("digitize", 0, 0);
-            let begin = Instant::now();
-            let (touches, counters) = heuristic.run(window);
-            timed("digitize", begin);
-            let path = ToolPath {
-                trajectory: plan.trajectory,
-                touches,
+            let (path, counters) = if local.fallback {
+                let window = Some(window);
+                let method = Method::Local(Local { window, ..local });
+                let job = Job { method, ..job };
+                digitize(&plan, &job, simd, display, stop, &mut timed)?
+            } else {
+                display.tell("digitize", 0, 0);
+                let begin = Instant::now();
+                let (touches, counters) = heuristic.run(window);
+                timed("digitize", begin);
+                let trajectory = plan.trajectory;
+                let path = ToolPath {
+                    trajectory,
+                    touches,
+                };
+                (path, counters)
             };
-            (path, counters)
+            (path, counters, Some(window))
         }
-        _ => digitize(&plan, &job, simd, display, stop, &mut timed)?,
+        method => {
+            let (path, counters) = digitize(&plan, &job, simd, display, stop, &mut timed)?;
+            let window = match method {
+                Method::Local(local) => local.window,
+                Method::Exact | Method::Brute => None,
+            };
+            (path, counters, window)
+        }
     };
     let record = Record {
         phases,

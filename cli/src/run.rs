@@ -47,10 +47,9 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
 pub(crate) fn submit(args: &args::Submit) -> Result<()> {
     perform(&args.job, None, None, async |part, file, display, _| {
         if let Method::Local(local) = file.job.method
-            && (!local.fallback || local.window.is_none())
+            && local.needs_whole_path()
         {
-            let what = "a chain of windows without a fallback, or a search for its size, needs the whole path";
-            return Err(Error::OneProcess { what });
+            return Err(Error::OneProcess);
         }
         submit::run(part, file.job, &args.master, progress(display)).await
     })

@@ -1,6 +1,8 @@
-//! What the machine has: memory, cores, a name; and the user's wish to stop.
+//! What the machine has: memory, cores, threads on them, a name; and the user's wish to stop.
 
 use sysinfo::{MemoryRefreshKind, RefreshKind, System};
+
+use crate::error::{Error, Result};
 
 /// Memory that a job may take, bytes: what is available, within the limits of a container.
 pub(crate) fn memory() -> u64 {
@@ -16,6 +18,12 @@ pub(crate) fn memory() -> u64 {
 /// Cores of this machine that this process may use.
 pub(crate) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+/// Threads of this process's own to compute on.
+pub(crate) fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|e| Error::Threads(e.to_string()))
 }
 
 /// Threads of all programs that wanted a core in the last minute, on average; 0 where nobody counts.

@@ -41,10 +41,9 @@ pub(crate) fn check(
     spacing: Option<f64>,
     threads: usize,
 ) -> Result<Verification> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|e| Error::Threads(e.to_string()))?;
     let (cutter, step) = (&file.job.cutter, Some(file.job.motion.step));
-    Ok(pool.install(|| horma_core::verify(part, cutter, step, positions, spacing))?)
+    Ok(system::pool(threads)?
+        .install(|| horma_core::verify(part, cutter, step, positions, spacing))?)
 }
 
 /// How deep a path may gouge, if the job says so.

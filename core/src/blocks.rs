@@ -3,8 +3,10 @@
 //! A run of joined isolines is cut into blocks along its own lines, which costs nothing; the triangles
 //! and points of slabs are halved along their longest side until a leaf holds them.
 
+use std::ops::Range;
+
 use crate::leaf::{FACETS, FacetLeaf, POINTS, PointLeaf};
-use crate::row::{Row, RowKind};
+use crate::row::{Row, RowKind, cell};
 use crate::vector::{Interval, Point};
 
 /// Rows and columns of a block of points.
@@ -24,20 +26,13 @@ pub(crate) struct Block {
 
 #[derive(Debug, Clone)]
 enum What {
-    /// Of the rows from `row` on and the columns from `column` on.
-    Cells {
-        row: u32,
-        rows: u32,
-        column: u32,
-        columns: u32,
+    /// The points, or the cells, of these rows and columns.
+    Tile {
+        rows: Range<usize>,
+        columns: Range<usize>,
     },
-    /// Of one slab, by number.
-    Scattered { row: u32, numbers: Vec<u32> },
-}
-
-/// The number of a row's `i`-th candidate in the part.
-fn number(row: &Row, i: usize) -> u64 {
-    u64::from(row.id) << 32 | i as u64
+    /// Those of one row with these numbers.
+    Scattered { row: usize, numbers: Vec<usize> },
 }
 
 /// Runs of rows: joined isolines, or a slab or an isoline by itself.
@@ -91,14 +86,13 @@ pub(crate) fn facet_blocks(rows: &[Row]) -> Vec<Block> {
 /// Cuts `size` rows and columns of a run into blocks of `side`.
 fn tile(first: usize, run: &[Row], size: (usize, usize), side: (usize, usize)) -> Vec<Block> {
     let block = |row: usize, column: usize| {
-        let (rows, columns) = (side.0.min(size.0 - row), side.1.min(size.1 - column));
+        let rows = row..size.0.min(row + side.0);
+        let columns = column..size.1.min(column + side.1);
         Block {
-            middle: run[row + rows / 2].points[column + columns / 2],
-            what: What::Cells {
-                row: (first + row) as u32,
-                rows: rows as u32,
-                column: column as u32,
-                columns: columns as u32,
+            middle: run[rows.start + rows.len() / 2].points[columns.start + columns.len() / 2],
+            what: What::Tile {
+                rows: first + rows.start..first + rows.end,
+                columns,
             },
         }
     };
@@ -111,23 +105,23 @@ fn tile(first: usize, run: &[Row], size: (usize, usize), side: (usize, usize)) -
 
 /// Halves candidates along their longest side until each lot fits into a leaf.
 fn scatter(row: usize, middles: &[Point], leaf: usize) -> Vec<Block> {
-    let mut numbers: Vec<u32> = (0..middles.len() as u32).collect();
+    let mut numbers: Vec<usize> = (0..middles.len()).collect();
     let mut blocks = Vec::new();
     let mut lots = vec![&mut numbers[..]];
     while let Some(lot) = lots.pop() {
         if lot.len() <= leaf {
             let sum = lot.iter().fold([0.0; 3], |sum, &n| {
-                [0, 1, 2].map(|k| sum[k] + middles[n as usize][k])
+                [0, 1, 2].map(|k| sum[k] + middles[n][k])
             });
             blocks.push(Block {
                 middle: sum.map(|s| s / lot.len() as f64),
                 what: What::Scattered {
-                    row: row as u32,
+                    row,
                     numbers: lot.to_vec(),
                 },
             });
         } else {
-            let at = |n: &u32| middles[*n as usize];
+            let at = |n: &usize| middles[*n];
             let axis = longest_side(&lot.iter().map(at));
             // Full leaves on the left.
             let half = (lot.len().div_ceil(leaf) / 2) * leaf;
@@ -151,23 +145,17 @@ pub(crate) fn longest_side(points: &(impl Iterator<Item = Point> + Clone)) -> us
 
 /// The leaf of a block of points.
 pub(crate) fn point_leaf(rows: &[Row], block: &Block) -> PointLeaf {
+    let numbered = |row: &Row, i: usize| (row.candidate(i), row.points[i]);
     match &block.what {
-        &What::Cells {
-            row,
-            rows: height,
-            column,
+        What::Tile {
+            rows: some,
             columns,
         } => {
-            let rows = &rows[row as usize..(row + height) as usize];
-            PointLeaf::new(rows.iter().flat_map(|row| {
-                let numbers = column as usize..(column + columns) as usize;
-                numbers.map(|i| (number(row, i), row.points[i]))
-            }))
+            let rows = rows[some.clone()].iter();
+            PointLeaf::new(rows.flat_map(|row| columns.clone().map(move |i| numbered(row, i))))
         }
         What::Scattered { row, numbers } => {
-            let row = &rows[*row as usize];
-            let points = numbers.iter().map(|&n| n as usize);
-            PointLeaf::new(points.map(|i| (number(row, i), row.points[i])))
+            PointLeaf::new(numbers.iter().map(|&i| numbered(&rows[*row], i)))
         }
     }
 }
@@ -180,36 +168,29 @@ pub(crate) fn facet_leaf(
     block: &Block,
 ) -> FacetLeaf {
     match &block.what {
-        &What::Cells {
-            row,
-            rows: height,
-            column,
+        What::Tile {
+            rows: some,
             columns,
         } => {
-            let cells = (row..row + height)
-                .flat_map(|row| (column..column + columns).map(move |column| (row, column)));
-            FacetLeaf::new(
-                points,
-                cells.flat_map(|(row, column)| {
-                    // As in `row::facets`.
-                    let row = row as usize;
-                    let first = number(&rows[row], 2 * column as usize);
-                    let (a, b) = (starts[row] + column, starts[row + 1] + column);
-                    [([a, b, b + 1], first), ([a, b + 1, a + 1], first + 1)]
-                }),
-            )
+            let cells = some
+                .clone()
+                .flat_map(|row| columns.clone().map(move |column| (row, column)));
+            let facets = cells.flat_map(|(row, column)| {
+                let first = rows[row].candidate(2 * column);
+                let column = column as u32;
+                let [a, b] = cell(starts[row] + column, starts[row + 1] + column);
+                [(a, first), (b, first + 1)]
+            });
+            FacetLeaf::new(points, facets)
         }
         What::Scattered { row, numbers } => {
-            let (row, start) = (&rows[*row as usize], starts[*row as usize]);
+            let (row, start) = (&rows[*row], starts[*row]);
             let facets: &[[u32; 3]] = match &row.kind {
                 RowKind::Slab { facets } => facets,
                 RowKind::Isoline { .. } => &[],
             };
-            let numbered = numbers.iter().map(|&n| n as usize);
-            FacetLeaf::new(
-                points,
-                numbered.map(|n| (facets[n].map(|c| start + c), number(row, n))),
-            )
+            let facet = |&n: &usize| (facets[n].map(|c| start + c), row.candidate(n));
+            FacetLeaf::new(points, numbers.iter().map(facet))
         }
     }
 }

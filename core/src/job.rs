@@ -117,6 +117,14 @@ impl Window {
     };
 }
 
+impl Local {
+    /// Whether it takes the whole path in one process: a chain of windows without the fallback is one
+    /// from end to end, and a window is found by trying it on all of it.
+    pub fn needs_whole_path(&self) -> bool {
+        !self.fallback || self.window.is_none()
+    }
+}
+
 impl Method {
     /// Checks the numbers and that the method fits the job.
     ///

@@ -61,18 +61,24 @@ impl Best {
 
 /// A few candidates.
 pub(crate) trait Leaf: Sync + Send {
+    /// What rules candidates out before they are evaluated.
+    type Ceiling;
+
+    /// The ceiling that touches F at a place on the cutter, `(d, z)`.
+    fn ceiling(cutter: &Cutter, pose: &Pose, place: [f64; 2]) -> Self::Ceiling;
+
     /// Its vertices.
     fn vertices(&self, points: &[Point]) -> Vec<Point>;
 
-    /// Raises `best` to the highest candidate; `ceiling` is a plane that F does not exceed. Returns how
-    /// many candidates were evaluated.
+    /// Raises `best` to the highest candidate; none is above the ceiling. Returns how many candidates
+    /// were evaluated.
     fn search<S: Simd>(
         &self,
         simd: S,
         points: &[Point],
         cutter: &Cutter,
         pose: &Pose,
-        ceiling: &Plane,
+        ceiling: &Self::Ceiling,
         best: &mut Best,
     ) -> u64;
 }
@@ -115,6 +121,12 @@ impl PointLeaf {
 }
 
 impl Leaf for PointLeaf {
+    /// Evaluating a point costs hardly more than ruling it out.
+    type Ceiling = ();
+
+    #[inline(always)]
+    fn ceiling(_: &Cutter, _: &Pose, _: [f64; 2]) -> Self::Ceiling {}
+
     fn vertices(&self, _: &[Point]) -> Vec<Point> {
         (0..self.count).map(|slot| self.point(slot)).collect()
     }
@@ -126,7 +138,7 @@ impl Leaf for PointLeaf {
         _: &[Point],
         cutter: &Cutter,
         pose: &Pose,
-        _: &Plane,
+        (): &Self::Ceiling,
         best: &mut Best,
     ) -> u64 {
         for first in (0..POINTS).step_by(LANES) {
@@ -220,6 +232,13 @@ impl FacetLeaf {
 }
 
 impl Leaf for FacetLeaf {
+    type Ceiling = Plane;
+
+    #[inline(always)]
+    fn ceiling(cutter: &Cutter, pose: &Pose, place: [f64; 2]) -> Self::Ceiling {
+        Plane::at(cutter, pose, place)
+    }
+
     fn vertices(&self, points: &[Point]) -> Vec<Point> {
         let mut corners = [0; 3 * FACETS];
         let used = 3 * self.count as usize;
@@ -237,7 +256,7 @@ impl Leaf for FacetLeaf {
         points: &[Point],
         cutter: &Cutter,
         pose: &Pose,
-        ceiling: &Plane,
+        ceiling: &Self::Ceiling,
         best: &mut Best,
     ) -> u64 {
         // Heights are counted from the best one, so that single precision tells close ones apart.

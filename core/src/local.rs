@@ -2,9 +2,8 @@
 //!
 //! On each surface only the points less than δu rows and δv columns from its last winner are looked at,
 //! wrapping round in v; once a surface comes within the cutter's width the search starts with all its
-//! points. The winner may leave the window unnoticed, so
-//! that the method is not exact by itself: `digitize` holds it against the hierarchy. Nothing is bounded
-//! here.
+//! points. The winner may leave the window unnoticed, so that the method is not exact by itself: it is
+//! held against the hierarchy, or against a path that is known. Nothing is bounded here.
 
 use std::ops::Range;
 
@@ -17,7 +16,7 @@ use crate::job::{Culling, Window};
 use crate::leaf::{Best, PointLeaf};
 use crate::path::Touch;
 use crate::record::Counters;
-use crate::row::{Row, RowKind};
+use crate::row::{Row, RowKind, row_and_place};
 use crate::sweep::Sweep;
 use crate::tree::{Start, Tree};
 use crate::vector::{Interval, Point, cross, dot, length, sub};
@@ -128,7 +127,7 @@ impl Grids {
 
     /// Moves the window of the grid that holds a point to it.
     pub fn move_to(&self, winners: &mut Winners, id: u64) {
-        let row = (id >> 32) as u32;
+        let (row, _) = row_and_place(id);
         for (grid, winner) in self.grids.iter().zip(winners) {
             if (grid.first_row..grid.first_row + grid.rows as u32).contains(&row) {
                 *winner = Some(grid.place(id));
@@ -217,8 +216,8 @@ pub(crate) fn chain<S: Simd>(
 impl Grid {
     /// Row and column of a point.
     fn place(&self, id: u64) -> (usize, usize) {
-        let row = ((id >> 32) as u32 - self.first_row) as usize;
-        (row, (id & u64::from(u32::MAX)) as usize)
+        let (row, column) = row_and_place(id);
+        ((row - self.first_row) as usize, column)
     }
 
     /// The columns less than `delta` from a column: one range, or two where they wrap round.

@@ -89,6 +89,11 @@ impl Row {
         Ok(())
     }
 
+    /// The number in the part of its `i`-th candidate, point or facet.
+    pub(crate) fn candidate(&self, i: usize) -> u64 {
+        u64::from(self.id) << 32 | i as u64
+    }
+
     /// Extent of the points along the spindle.
     fn x(&self) -> Interval {
         Interval::of(self.points.iter().map(|p| p[0]))
@@ -104,6 +109,16 @@ pub(crate) struct Facet {
     pub number: usize,
     /// Its corners, as indices into the points of all of them, one row after the other.
     pub corners: [u32; 3],
+}
+
+/// The row's id and the place in it of a candidate by its number.
+pub(crate) fn row_and_place(candidate: u64) -> (u32, usize) {
+    ((candidate >> 32) as u32, candidate as u32 as usize)
+}
+
+/// The two facets of the cell whose first corners are `a` in its own row and `b` in the next one.
+pub(crate) fn cell(a: u32, b: u32) -> [[u32; 3]; 2] {
+    [[a, b, b + 1], [a, b + 1, a + 1]]
 }
 
 /// Where the points of each row begin among the points of all of them.
@@ -132,10 +147,8 @@ pub(crate) fn facets(rows: &[Row]) -> impl Iterator<Item = Facet> {
                 (RowKind::Isoline { .. }, _) => (&[][..], 0),
             };
             let own = slab.iter().map(move |f| f.map(|c| start + c));
-            let between = (1..columns).flat_map(move |k| {
-                let (a, b) = (start + k, start + columns + k);
-                [[a - 1, b - 1, b], [a - 1, b, a]]
-            });
+            let cells = 0..columns.saturating_sub(1);
+            let between = cells.flat_map(move |k| cell(start + k, start + columns + k));
             let all = own.chain(between).enumerate();
             all.map(move |(number, corners)| Facet {
                 row: i,

@@ -24,8 +24,8 @@ pub(crate) struct Sweep {
     normals: Option<[Vec<f64>; 2]>,
     /// Whether points beyond the cutter's width are left out.
     within_width: bool,
-    /// Ids of the rows and the places at which their points end.
-    rows: Vec<(u32, usize)>,
+    /// The first candidate of each row, and the place of its point.
+    rows: Vec<(u64, usize)>,
 }
 
 impl Sweep {
@@ -37,13 +37,14 @@ impl Sweep {
             let filler = std::iter::repeat_n(filler, LANES);
             points.iter().map(|p| p[k]).chain(filler).collect()
         };
-        let mut end = 0;
-        let ends = rows.iter().map(|r| {
-            end += r.points.len();
-            (r.id, end)
+        let mut start = 0;
+        let starts = rows.iter().map(|r| {
+            let place = start;
+            start += r.points.len();
+            (r.candidate(0), place)
         });
         Self {
-            rows: ends.collect(),
+            rows: starts.collect(),
             at: [
                 axis(&points, 0, f64::INFINITY),
                 axis(&points, 1, 0.0),
@@ -118,9 +119,8 @@ impl Sweep {
 
     /// The number in the part of the point at a place.
     fn number(&self, place: usize) -> u64 {
-        let row = self.rows.partition_point(|&(_, end)| end <= place);
-        let begin = row.checked_sub(1).map_or(0, |before| self.rows[before].1);
-        u64::from(self.rows[row].0) << 32 | (place - begin) as u64
+        let (first, start) = self.rows[self.rows.partition_point(|&(_, s)| s <= place) - 1];
+        first + (place - start) as u64
     }
 }
 
@@ -151,7 +151,7 @@ impl AllFacets {
     pub fn new(rows: &[Row]) -> Self {
         let points: Vec<Point> = rows.iter().flat_map(|r| r.points.iter().copied()).collect();
         let facet = |f: Facet| {
-            let id = u64::from(rows[f.row].id) << 32 | f.number as u64;
+            let id = rows[f.row].candidate(f.number);
             (id, f.corners.map(|c| points[c as usize]))
         };
         Self(facets(rows).map(facet).collect())

@@ -10,7 +10,7 @@ use fearless_simd::{Simd, f32x8, prelude::*};
 use rayon::prelude::*;
 
 use crate::blocks::{Block, longest_side};
-use crate::bound::{Frame, Lids, Plane, View, lid_bounds};
+use crate::bound::{Frame, Lids, View, lid_bounds};
 use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::LANES;
@@ -116,7 +116,7 @@ impl<L: Leaf> Tree<L> {
             return;
         }
         let view = View::new(&self.frame, cutter, pose);
-        let mut top = Top::new(cutter, pose, place, best.height);
+        let mut top = Top::<L>::new(cutter, pose, place, best.height);
         let mut open = Stack::new();
         open.push(f32::INFINITY, INNER);
         // Equal heights are still looked at: a lower number may be among them.
@@ -125,7 +125,7 @@ impl<L: Leaf> Tree<L> {
                 let before = (best.height, best.id);
                 let leaf = &self.leaves[child as usize];
                 counters.evaluations +=
-                    leaf.search(simd, &self.points, cutter, pose, &top.plane, best);
+                    leaf.search(simd, &self.points, cutter, pose, &top.ceiling, best);
                 if before != (best.height, best.id) {
                     let [d, _, z] = pose.face(best.contact);
                     top = Top::new(cutter, pose, [d, z], best.height);
@@ -150,22 +150,22 @@ pub(crate) struct Start {
 }
 
 /// What the best candidate so far rules out.
-struct Top {
+struct Top<L: Leaf> {
     /// Not above its height, and never below everything.
     height: f32,
-    /// `(d, z)` of its place on the cutter, and the tangent plane there.
+    /// `(d, z)` of its place on the cutter, and what leaves make of it.
     place: [f32; 2],
-    plane: Plane,
+    ceiling: L::Ceiling,
 }
 
-impl Top {
+impl<L: Leaf> Top<L> {
     #[inline(always)]
     fn new(cutter: &Cutter, pose: &Pose, place: [f64; 2], height: f64) -> Self {
         let low = height as f32 - height.abs() as f32 * f32::EPSILON;
         Self {
             height: low.max(f32::MIN),
             place: [place[0] as f32, place[1] as f32],
-            plane: Plane::at(cutter, pose, place),
+            ceiling: L::ceiling(cutter, pose, place),
         }
     }
 }
@@ -318,23 +318,24 @@ fn build(
     let Some((node, mut below)) = nodes.split_first_mut() else {
         return;
     };
+    let child = |start: usize| start..leaves.end.min(start + size);
+    let starts = || leaves.clone().step_by(size).enumerate();
     let mut tasks = Vec::with_capacity(LANES);
     let mut at = offset + 1;
-    for (lane, start) in leaves.clone().step_by(size).enumerate() {
-        let child = start..leaves.end.min(start + size);
+    for (lane, start) in starts() {
         node.children[lane] = start as u32;
         if size > 1 {
             node.children[lane] = INNER | at as u32;
-            let (own, rest) = below.split_at_mut(self::nodes(child.len()));
-            at += own.len();
+            let (own, rest) = below.split_at_mut(self::nodes(child(start).len()));
             below = rest;
-            tasks.push((child, own, at - self::nodes(size.min(leaves.end - start))));
+            let nodes = own.len();
+            tasks.push((child(start), own, at));
+            at += nodes;
         }
     }
     let fill = |node: &mut Node| {
-        for (lane, start) in leaves.clone().step_by(size).enumerate() {
-            let child = start..leaves.end.min(start + size);
-            node.lids.set(lane, frame, outline.of(child));
+        for (lane, start) in starts() {
+            node.lids.set(lane, frame, outline.of(child(start)));
         }
     };
     if leaves.len() < ALONE {

@@ -16,11 +16,10 @@ impl Source<'_> {
         let method = self.choose(method, "method", Method::Exact, &METHODS)?;
         let Method::Local(_) = method else {
             // Set by a flag they may stay in the file; they belong to the other method.
+            let mut given = section.only_local().into_iter();
+            let given = given.find_map(|(key, at)| Some((key, at.filter(|at| at.in_file())?)));
             if section.method.as_ref().is_none_or(Given::in_file)
-                && let Some((key, at)) = section.only_local().into_iter().find_map(|(k, at)| {
-                    let at = at.filter(|at| at.in_file())?;
-                    Some((k, at))
-                })
+                && let Some((key, at)) = given
             {
                 let what = format!("{key} belongs to method = \"local\"");
                 return Err(self.wrong(Some(at), what));
@@ -54,24 +53,14 @@ impl Source<'_> {
 
     /// What only one process can do.
     pub(super) fn in_one_process(&self, raw: &RawJob, method: Method, workers: u32) -> Result<()> {
-        let Method::Local(local) = method else {
-            return Ok(());
-        };
-        let what = match local {
-            _ if workers == 0 => return Ok(()),
-            Local {
-                fallback: false, ..
-            } => "the local search without its fallback is one chain of windows",
-            Local { window: None, .. } => {
-                "delta_u and delta_v are found by trying them on the whole path"
+        match method {
+            Method::Local(local) if workers > 0 && local.needs_whole_path() => {
+                let what = "without its fallback, or without delta_u and delta_v, the local search \
+                    goes over the whole path in one process; set workers to 0";
+                Err(self.wrong(raw.digitizing.method.as_ref().map(|g| &g.at), what))
             }
-            Local { .. } => return Ok(()),
-        };
-        let at = raw.digitizing.method.as_ref().map(|g| &g.at);
-        Err(self.wrong(
-            at,
-            format!("{what}, which takes one process; set workers to 0"),
-        ))
+            Method::Exact | Method::Brute | Method::Local(_) => Ok(()),
+        }
     }
 }
 
