@@ -2,9 +2,10 @@
 //!
 //! Positions are cut by x into runs of equal predicted work; an extent needs every row that the
 //! cutter can reach from its positions. Both are decided here, once, whatever the distribution.
+//! Where positions are inserted an extent owns the moves that begin at its positions, and also needs
+//! what is in reach from the one that the last of them ends at.
 
-use crate::cutter::Cutter;
-use crate::job::Method;
+use crate::job::{Job, Method};
 use crate::motion::Trajectory;
 use crate::row::Outline;
 use crate::tolerance::REACH_SLACK;
@@ -27,14 +28,8 @@ pub struct Extent {
 const SAMPLES: u64 = 4096;
 
 /// Cuts the trajectory into at most `parts` extents of about equal predicted work, none empty.
-pub fn split(
-    trajectory: &Trajectory,
-    outlines: &[Outline],
-    cutter: &Cutter,
-    method: Method,
-    parts: u32,
-) -> Vec<Extent> {
-    let w = cutter.half_width() + REACH_SLACK;
+pub fn split(trajectory: &Trajectory, outlines: &[Outline], job: &Job, parts: u32) -> Vec<Extent> {
+    let w = job.cutter.half_width() + REACH_SLACK;
     let reach = Reach::new(outlines);
     let blocks = trajectory.positions.min(SAMPLES);
     let block =
@@ -48,7 +43,7 @@ pub fn split(
                 low: x - w,
                 high: x + w,
             });
-            total += (positions.end - positions.start) as f64 * predicted(method, candidates);
+            total += (positions.end - positions.start) as f64 * predicted(job.method, candidates);
             total
         })
         .collect();
@@ -61,16 +56,21 @@ pub fn split(
     cuts.insert(0, 0);
     cuts.push(trajectory.positions);
     cuts.dedup();
+    // Where the last moves of an extent end.
+    let seen = |end: u64| match job.motion.path_tolerance {
+        Some(_) => trajectory.positions.min(end + 1),
+        None => end,
+    };
     (0..)
         .zip(cuts.windows(2))
-        .map(|(id, ends)| Extent {
-            id,
-            first: ends[0],
-            count: ends[1] - ends[0],
-            rows: rows_within(
-                outlines,
-                trajectory.travel_of(ends[0], ends[1] - ends[0]).widened(w),
-            ),
+        .map(|(id, ends)| {
+            let travel = trajectory.travel_of(ends[0], seen(ends[1]) - ends[0]);
+            Extent {
+                id,
+                first: ends[0],
+                count: ends[1] - ends[0],
+                rows: rows_within(outlines, travel.widened(w)),
+            }
         })
         .collect()
 }
@@ -139,8 +139,27 @@ impl Reach {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::MotionKind;
+    use crate::cutter::Cutter;
+    use crate::job::{Contact, Discretization};
+    use crate::motion::{Motion, MotionKind};
     use proptest::prelude::*;
+
+    fn job(radius: f64, path_tolerance: Option<f64>) -> Job {
+        Job {
+            discretization: Discretization::Tolerance(0.1),
+            cutter: Cutter::ball(radius).expect("valid"),
+            motion: Motion {
+                kind: MotionKind::Helix,
+                step: 3.0,
+                points_per_revolution: 40,
+                from: None,
+                to: None,
+                path_tolerance,
+            },
+            contact: Contact::Point,
+            method: Method::Exact,
+        }
+    }
 
     fn outlines() -> impl Strategy<Value = Vec<Outline>> {
         let row = (-10.0..110.0_f64, 0.0..20.0_f64, any::<bool>());
@@ -166,8 +185,8 @@ mod tests {
             positions in 1..5000_u64,
             parts in 1..20_u32,
             radius in 0.5..30.0_f64,
+            between in any::<bool>(),
         ) {
-            let cutter = Cutter::ball(radius).expect("valid");
             let trajectory = Trajectory {
                 kind: MotionKind::Helix,
                 from: -5.0,
@@ -175,14 +194,16 @@ mod tests {
                 points_per_revolution: 40,
                 positions,
             };
-            let extents = split(&trajectory, &outlines, &cutter, Method::Exact, parts);
+            let job = job(radius, between.then_some(0.01));
+            let extents = split(&trajectory, &outlines, &job, parts);
             prop_assert!(extents.len() <= parts as usize);
             let mut next = 0;
             for (i, e) in extents.iter().enumerate() {
                 prop_assert_eq!((e.id as usize, e.first), (i, next));
                 prop_assert!(e.count > 0);
                 next += e.count;
-                for index in [e.first, e.first + e.count - 1] {
+                let last = e.first + e.count - u64::from(!between || next == positions);
+                for index in [e.first, last] {
                     let x = trajectory.travel(index);
                     for (id, o) in (0u32..).zip(&outlines) {
                         if o.x.low <= x + radius && o.x.high >= x - radius {
@@ -216,8 +237,7 @@ mod tests {
             points_per_revolution: 100,
             positions: 20_001,
         };
-        let cutter = Cutter::ball(1.0).expect("valid");
-        let halves = split(&trajectory, &outlines, &cutter, Method::Exact, 2);
+        let halves = split(&trajectory, &outlines, &job(1.0, None), 2);
         let cut = trajectory.travel(halves[1].first);
         assert!(
             (cut - 50.0).abs() < 2.0,

@@ -42,6 +42,7 @@ mod tree;
 mod local;
 mod sweep;
 
+mod between;
 mod digitize;
 
 mod path;
@@ -56,9 +57,9 @@ pub use discretize::{Model, discretize};
 pub use error::{Error, Result};
 pub use extent::Extent;
 pub use job::{Contact, Culling, Discretization, Job, Local, Method, Window};
-pub use motion::{Motion, MotionKind, Trajectory};
+pub use motion::{Index, Motion, MotionKind, Trajectory};
 pub use part::{Body, Mesh, Part, Shape};
-pub use path::{SubTrajectory, ToolPath, Touch, stitch};
+pub use path::{Inserted, SubTrajectory, ToolPath, Touch, Waypoint, stitch};
 pub use placement::{Axis, place};
 pub use plan::Plan;
 pub use record::{BodyRecord, Counters, ExtentRecord, LostAttempt, Phase, Record, WorkerRecord};

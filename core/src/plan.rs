@@ -17,10 +17,16 @@ pub struct Plan {
     pub model: Model,
     /// The positions.
     pub trajectory: Trajectory,
+    /// How many positions may be inserted between them: as many as there is memory for; none if the
+    /// job does not ask for any.
+    pub most_inserted: u64,
 }
 
 /// Memory for each position: its touch while it is collected, stitched and written.
 const POSITION_BYTES: f64 = 160.0;
+
+/// Memory for each inserted position: the same, and what [`crate::verify()`] takes.
+const INSERTED_BYTES: f64 = 400.0;
 
 /// Memory for each point of a grid: in its row, in the hierarchy, and its two facets.
 const POINT_BYTES: f64 = 320.0;
@@ -33,9 +39,7 @@ impl Plan {
     /// [`crate::Motion::over`].
     pub fn new(part: &Part, job: Job, memory: u64) -> Result<Self> {
         part.validate()?;
-        job.motion.validate()?;
-        job.discretization.validate()?;
-        job.method.validate(job.contact)?;
+        job.validate()?;
         if let Method::Local(_) = job.method {
             let mesh = part
                 .bodies
@@ -58,11 +62,29 @@ impl Plan {
             .iter()
             .fold(Interval::EMPTY, |x, r| x.hull(r.x));
         let trajectory = job.motion.over(x, half_width)?;
+        let left = memory as f64 - memory_for(points, trajectory.positions);
+        let most_inserted = match job.motion.path_tolerance {
+            Some(_) => (left / INSERTED_BYTES) as u64,
+            None => 0,
+        };
         Ok(Self {
             job,
             model,
             trajectory,
+            most_inserted,
         })
+    }
+
+    /// Whether so many inserted positions can be kept.
+    ///
+    /// # Errors
+    /// [`Error::TooManyInserted`]
+    pub fn check_inserted(&self, inserted: u64) -> Result<()> {
+        let limit = self.most_inserted;
+        if inserted > limit {
+            return Err(Error::TooManyInserted { limit });
+        }
+        Ok(())
     }
 
     /// Cuts the positions into at most `parts` extents of about equal predicted work.
@@ -71,8 +93,9 @@ impl Plan {
             job,
             model,
             trajectory,
+            ..
         } = self;
-        split(trajectory, &model.outlines, &job.cutter, job.method, parts)
+        split(trajectory, &model.outlines, job, parts)
     }
 }
 
@@ -101,7 +124,7 @@ fn points(part: &Part, discretization: Discretization) -> f64 {
 }
 
 fn check_memory(points: f64, positions: u64, available: u64) -> Result<()> {
-    let needed = points * POINT_BYTES + positions as f64 * POSITION_BYTES;
+    let needed = memory_for(points, positions);
     if needed > available as f64 {
         return Err(Error::OutOfMemory {
             points,
@@ -111,4 +134,8 @@ fn check_memory(points: f64, positions: u64, available: u64) -> Result<()> {
         });
     }
     Ok(())
+}
+
+fn memory_for(points: f64, positions: u64) -> f64 {
+    points * POINT_BYTES + positions as f64 * POSITION_BYTES
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use horma_core::{Extent, ExtentRecord, Plan, SubTrajectory};
+use horma_core::{Extent, ExtentRecord, Inserted, Plan, SubTrajectory};
 use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::digitize_request::Kind as Request;
 use horma_proto::wire::worker_client::WorkerClient;
@@ -35,6 +35,8 @@ pub(crate) struct Attempt {
     pub overlap_rows: u32,
     /// Positions of the job that have arrived so far.
     pub arrived: Arc<AtomicU64>,
+    /// Those of them that were inserted, which `arrived` does not count.
+    pub inserted: Arc<AtomicU64>,
     pub progress: Progress,
 }
 
@@ -57,7 +59,7 @@ pub(crate) async fn dispatch(
 ) -> Result<Delivery, Undelivered> {
     let mut received = SubTrajectory {
         first: attempt.extent.first,
-        touches: Vec::new(),
+        ..SubTrajectory::default()
     };
     let call = call(&attempt, &mut received);
     let outcome = tokio::select! {
@@ -74,6 +76,12 @@ pub(crate) async fn dispatch(
             attempt
                 .arrived
                 .fetch_sub(positions_received, Ordering::Relaxed);
+            // Beyond what there is memory for the job is over, and the driver has to see it.
+            let all = attempt.inserted.load(Ordering::Relaxed);
+            if attempt.plan.check_inserted(all).is_ok() {
+                let inserted = received.between.len() as u64;
+                attempt.inserted.fetch_sub(inserted, Ordering::Relaxed);
+            }
             Err(Undelivered {
                 fault,
                 positions_received,
@@ -164,16 +172,17 @@ async fn receive(
         let left = attempt.extent.first + attempt.extent.count - next;
         match reply.kind {
             Some(Reply::Positions(positions)) => {
-                let touches = horma_proto::unpack_positions(&positions).map_err(wrong)?;
-                let count = touches.len() as u64;
-                if positions.first != next || count > left {
+                let run = horma_proto::unpack_positions(&positions, total).map_err(wrong)?;
+                let count = run.touches.len() as u64;
+                if run.first != next || count > left {
                     return Err(Fault::Wrong(format!(
                         "it sent positions {} to {} where position {next} was next and {left} were left",
-                        positions.first,
-                        positions.first + count,
+                        run.first,
+                        run.end(),
                     )));
                 }
-                received.touches.extend(touches);
+                receive_inserted(attempt, received, run.between)?;
+                received.touches.extend(run.touches);
                 let arrived = attempt.arrived.fetch_add(count, Ordering::Relaxed) + count;
                 (attempt.progress)("digitize", arrived, total);
             }
@@ -193,6 +202,23 @@ async fn receive(
         }
     }
     Err(Fault::Lost("it ended its answer early".to_owned()))
+}
+
+/// Takes in what was inserted, if that was asked for and there is memory for it.
+fn receive_inserted(
+    attempt: &Attempt,
+    received: &mut SubTrajectory,
+    between: Vec<Inserted>,
+) -> Result<(), Fault> {
+    if attempt.plan.job.motion.path_tolerance.is_none() && !between.is_empty() {
+        let why = "it inserted positions that nobody asked for";
+        return Err(Fault::Wrong(why.to_owned()));
+    }
+    let count = between.len() as u64;
+    let all = attempt.inserted.fetch_add(count, Ordering::Relaxed) + count;
+    received.between.extend(between);
+    let fits = attempt.plan.check_inserted(all);
+    fits.map_err(|e| Fault::Lost(e.to_string()))
 }
 
 /// What a status says of the worker. Only an answer about the content is the worker's fault; a

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use horma_core::{
@@ -180,6 +180,8 @@ struct RunningJob {
     progress: Progress,
     /// Positions that have arrived.
     arrived: Arc<AtomicU64>,
+    /// Inserted positions that have arrived.
+    inserted: Arc<AtomicU64>,
     /// What was delivered and kept, by extent.
     kept: BTreeMap<u32, (SubTrajectory, ExtentRecord)>,
     lost: Vec<LostAttempt>,
@@ -286,6 +288,7 @@ impl Driver {
                     users,
                     progress,
                     arrived: Arc::default(),
+                    inserted: Arc::default(),
                     kept: BTreeMap::new(),
                     lost: Vec::new(),
                     calls: BTreeMap::new(),
@@ -320,6 +323,15 @@ impl Driver {
             return;
         };
         job.calls.remove(&task);
+        let inserted = job.inserted.load(Ordering::Relaxed);
+        if let Err(error) = job.plan.check_inserted(inserted) {
+            warn!(job = task.job, %error, "failed");
+            self.apply(Event::Cancelled { job: task.job }, None);
+            if let Some(job) = self.jobs.remove(&task.job) {
+                let _ = job.reply.send(Err(Error::Plan(error)));
+            }
+            return;
+        }
         match outcome {
             Ok(delivery) => {
                 info!(%task, worker, "delivered");
@@ -405,6 +417,7 @@ impl Driver {
             overlap_rows: extent.rows.iter().filter(shared).count() as u32,
             extent,
             arrived: job.arrived.clone(),
+            inserted: job.inserted.clone(),
             progress: job.progress.clone(),
         };
         info!(%task, worker, positions = attempt.extent.count, "started");

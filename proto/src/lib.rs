@@ -16,7 +16,8 @@ pub mod wire {
     tonic::include_proto!("horma.cluster.v1");
 }
 
-pub use chunk::{CHUNK_BYTES, Chunks, Messages, POSITION_BYTES, pack_positions, unpack_positions};
+pub use chunk::{CHUNK_BYTES, Chunks, Messages};
+pub use chunk::{pack_positions, position_chunks, unpack_positions};
 pub use convert::{body_from_wire, body_to_wire, job_from_wire, job_to_wire};
 pub use convert::{counters_from_wire, counters_to_wire};
 pub use convert::{row_from_wire, row_to_wire, trajectory_from_wire, trajectory_to_wire};

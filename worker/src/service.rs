@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use horma_core::{Digitizer, Job, Row, Simd, Trajectory};
+use horma_core::{Digitizer, Job, Row, Simd, SubTrajectory, Trajectory};
 use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::digitize_request::Kind as Request;
 use horma_proto::wire::worker_server::Worker;
@@ -157,10 +157,15 @@ fn digitize(
     let build_seconds = begin.elapsed().as_secs_f64();
     let begin = Instant::now();
     let positions = task.first..task.first + task.count;
-    let counters = digitizer.run_chunks(&task.trajectory, positions, |first, touches| {
-        debug!(id = %task.id, first, count = touches.len(), "positions");
-        let positions = horma_proto::pack_positions(first, &touches);
-        !shutdown.is_cancelled() && send(Reply::Positions(positions))
+    let counters = digitizer.run_chunks(&task.trajectory, positions, |run| {
+        let SubTrajectory {
+            first,
+            touches,
+            between,
+        } = run;
+        debug!(id = %task.id, first, count = touches.len(), between = between.len(), "positions");
+        let mut messages = horma_proto::position_chunks(first, &touches, &between);
+        messages.all(|m| !shutdown.is_cancelled() && send(Reply::Positions(m)))
     });
     if shutdown.is_cancelled() {
         // Nobody may be left to hear it; either way the extent goes to another worker.
