@@ -1,0 +1,180 @@
+//! Connections, the same everywhere: how one is made, kept alive and given up, plain or with TLS, and
+//! what it means that one failed. Who connects to whom, and when, is decided elsewhere.
+
+use std::time::Duration;
+
+use tokio::net::TcpListener;
+use tokio_rustls::rustls::{self, AlertDescription, CertificateError};
+use tonic::transport::server::{Router, TcpIncoming};
+use tonic::transport::{Endpoint, Server};
+
+use crate::accept;
+use crate::tls::{Role, Tls};
+
+/// Longest time to connect.
+const CONNECT: Duration = Duration::from_secs(5);
+
+/// How often a connection with open calls is tried: a host that is cut off sends no reset.
+const KEEPALIVE: Duration = Duration::from_secs(5);
+
+/// How long the answer to such a try may take.
+const ANSWER: Duration = Duration::from_secs(10);
+
+/// The way to a peer at `address`, `host:port`, who has to prove that role if there is TLS.
+///
+/// # Errors
+/// The address cannot be one.
+pub fn endpoint(
+    address: &str,
+    role: Role,
+    tls: Option<&Tls>,
+) -> Result<Endpoint, tonic::transport::Error> {
+    let endpoint = match tls {
+        None => Endpoint::from_shared(format!("http://{address}"))?,
+        Some(tls) => Endpoint::from_shared(format!("https://{address}"))?
+            .tls_config(tls.client.clone().domain_name(role.dns_name()))?,
+    };
+    Ok(endpoint
+        .connect_timeout(CONNECT)
+        .http2_keep_alive_interval(KEEPALIVE)
+        .keep_alive_timeout(ANSWER)
+        .tcp_keepalive(Some(KEEPALIVE))
+        .tcp_nodelay(true))
+}
+
+/// A server without services yet.
+pub fn server() -> Server {
+    Server::builder()
+        .http2_keepalive_interval(Some(KEEPALIVE))
+        .http2_keepalive_timeout(Some(ANSWER))
+}
+
+/// Serves on `listener` until `shutdown` and the end of all open calls.
+///
+/// # Errors
+/// The listener is gone.
+pub async fn serve(
+    services: Router,
+    listener: TcpListener,
+    tls: Option<&Tls>,
+    shutdown: impl Future<Output = ()>,
+) -> Result<(), tonic::transport::Error> {
+    match tls {
+        None => {
+            let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+            services
+                .serve_with_incoming_shutdown(incoming, shutdown)
+                .await
+        }
+        Some(tls) => {
+            let incoming = accept::secured(listener, tls.acceptor.clone());
+            services
+                .serve_with_incoming_shutdown(incoming, shutdown)
+                .await
+        }
+    }
+}
+
+/// Why there is no connection, in words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Trouble {
+    /// One of the two ends does not trust the other: no second try will help.
+    Untrusted(String),
+    /// Nobody is there, or what is between is broken: another try may help.
+    Unreachable(String),
+}
+
+impl Trouble {
+    /// What it means that a connection to a peer of that role failed with this error.
+    pub fn of(error: &(dyn std::error::Error + 'static), role: Role, tls: Option<&Tls>) -> Self {
+        let all = || std::iter::successors(Some(error), |e| e.source());
+        if let Some(why) = all().find_map(rustls_error).and_then(|e| distrust(e, role)) {
+            return Self::Untrusted(why);
+        }
+        let text = all().last().map_or_else(String::new, ToString::to_string);
+        // Past the handshake only the text of an alert comes through.
+        if let Some(alert) = all().find_map(|e| alert(&e.to_string())) {
+            return Self::Untrusted(alert.to_owned());
+        }
+        let connected = !all().any(|e| e.is::<tonic::ConnectError>());
+        if tls.is_none() && connected {
+            return Self::Unreachable(format!(
+                "{text}; if it wants TLS, give --tls-ca, --tls-cert and --tls-key"
+            ));
+        }
+        Self::Unreachable(text)
+    }
+
+    /// The words.
+    pub fn into_reason(self) -> String {
+        match self {
+            Self::Untrusted(reason) | Self::Unreachable(reason) => reason,
+        }
+    }
+}
+
+/// The TLS error within an error.
+fn rustls_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a rustls::Error> {
+    let within = || {
+        error
+            .downcast_ref::<std::io::Error>()?
+            .get_ref()?
+            .downcast_ref()
+    };
+    error.downcast_ref().or_else(within)
+}
+
+/// Why a handshake ended, if one of the ends wanted it so.
+fn distrust(error: &rustls::Error, role: Role) -> Option<String> {
+    use CertificateError as C;
+    let why = match error {
+        rustls::Error::InvalidMessage(_) => {
+            "it does not speak TLS; give it --tls-ca, --tls-cert and --tls-key, or none of them here"
+        }
+        rustls::Error::AlertReceived(alert) => return Some(refusal(*alert).to_owned()),
+        rustls::Error::InvalidCertificate(error) => match error {
+            C::NotValidForName | C::NotValidForNameContext { .. } => {
+                return Some(format!("its certificate does not name the role {role}"));
+            }
+            C::Expired | C::ExpiredContext { .. } => "its certificate has expired",
+            C::NotValidYet | C::NotValidYetContext { .. } => {
+                "its certificate is not valid yet; compare the clocks"
+            }
+            _ => "its certificate is not from the authority given",
+        },
+        rustls::Error::NoCertificatesPresented => "it shows no certificate",
+        rustls::Error::PeerIncompatible(_) => "it speaks another TLS",
+        _ => return None,
+    };
+    Some(why.to_owned())
+}
+
+/// What the other end meant by an alert.
+fn refusal(alert: AlertDescription) -> &'static str {
+    match alert {
+        AlertDescription::CertificateRequired => "it demands a certificate",
+        AlertDescription::CertificateExpired => {
+            "it refuses the certificate shown to it, which has expired by its clock"
+        }
+        AlertDescription::UnknownCA | AlertDescription::DecryptError => {
+            "it refuses the certificate shown to it, which is not from its authority"
+        }
+        AlertDescription::ProtocolVersion | AlertDescription::NoApplicationProtocol => {
+            "it speaks another TLS"
+        }
+        _ => "it refuses the certificate shown to it",
+    }
+}
+
+/// What the other end meant, from the text of an error.
+fn alert(text: &str) -> Option<&'static str> {
+    let (_, name) = text.split_once("received fatal alert: ")?;
+    let known = [
+        AlertDescription::CertificateRequired,
+        AlertDescription::CertificateExpired,
+        AlertDescription::UnknownCA,
+        AlertDescription::DecryptError,
+    ];
+    let alert = known.into_iter().find(|a| name.contains(&format!("{a:?}")));
+    Some(alert.map_or("it refuses the certificate shown to it", refusal))
+}
