@@ -139,17 +139,16 @@ pub(crate) struct Submit {
 /// What proves who is who. With it all traffic is encrypted, and both ends of every connection show a
 /// certificate of the same authority.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Encryption, both ends authenticated")]
 pub(crate) struct Tls {
     /// Certificate of the authority whose certificates count, PEM
-    #[arg(long, value_name = "FILE", env = "HORMA_TLS_CA", requires_all = ["tls_cert", "tls_key"])]
+    #[arg(long, value_name = "FILE", env = "HORMA_TLS_CA", requires_all = ["tls_cert", "tls_key"], help_heading = "Encrypted, both ends authenticated")]
     pub tls_ca: Option<PathBuf>,
     /// This process's certificate, with those in between if there are any, PEM; its DNS names tell its
     /// roles
-    #[arg(long, value_name = "FILE", env = "HORMA_TLS_CERT", requires_all = ["tls_ca", "tls_key"])]
+    #[arg(long, value_name = "FILE", env = "HORMA_TLS_CERT", requires_all = ["tls_ca", "tls_key"], help_heading = "Encrypted, both ends authenticated")]
     pub tls_cert: Option<PathBuf>,
     /// The certificate's private key, PEM
-    #[arg(long, value_name = "FILE", env = "HORMA_TLS_KEY", requires_all = ["tls_ca", "tls_cert"])]
+    #[arg(long, value_name = "FILE", env = "HORMA_TLS_KEY", requires_all = ["tls_ca", "tls_cert"], help_heading = "Encrypted, both ends authenticated")]
     pub tls_key: Option<PathBuf>,
 }
 
