@@ -23,8 +23,8 @@ pub(crate) async fn run(
     let bad_address = |_| Error::Address {
         address: address.to_owned(),
     };
-    let endpoint = transport::endpoint(address, Role::Master, tls).map_err(bad_address)?;
-    let connected = endpoint.connect().await;
+    let endpoint = transport::endpoint(address).map_err(bad_address)?;
+    let connected = transport::connect(&endpoint, Role::Master, tls).await;
     let channel = connected.map_err(|e| silence(address, &e, tls))?;
     let mut client = MasterClient::new(channel)
         .max_decoding_message_size(MAX_MESSAGE)

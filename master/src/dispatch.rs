@@ -80,8 +80,10 @@ async fn call(attempt: &Attempt, received: &mut SubTrajectory) -> Result<ExtentR
     let begin = Instant::now();
     let tls = attempt.tls.as_ref();
     let lost = |e: tonic::transport::Error| lost(&e, tls);
-    let endpoint = transport::endpoint(&attempt.address, Role::Worker, tls).map_err(lost)?;
-    let channel = endpoint.connect().await.map_err(lost)?;
+    let endpoint = transport::endpoint(&attempt.address).map_err(lost)?;
+    let channel = transport::connect(&endpoint, Role::Worker, tls)
+        .await
+        .map_err(lost)?;
     let mut client = WorkerClient::new(channel)
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);

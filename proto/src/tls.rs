@@ -10,15 +10,14 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio_rustls::TlsAcceptor;
 use tokio_rustls::rustls::client::verify_server_name;
 use tokio_rustls::rustls::crypto::ring;
 use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName, UnixTime};
 use tokio_rustls::rustls::server::{ParsedCertificate, WebPkiClientVerifier};
 use tokio_rustls::rustls::sign::{CertifiedKey, SingleCertAndKey};
-use tokio_rustls::rustls::{self, CertificateError, RootCertStore, ServerConfig};
-use tonic::transport::{Certificate, ClientTlsConfig, Identity};
+use tokio_rustls::rustls::{self, CertificateError, ClientConfig, RootCertStore, ServerConfig};
+use tokio_rustls::{TlsAcceptor, TlsConnector};
 
 use crate::error::Error;
 
@@ -91,7 +90,7 @@ fn words(roles: &[Role]) -> String {
 #[derive(Clone)]
 pub struct Tls {
     roles: Vec<Role>,
-    pub(crate) client: ClientTlsConfig,
+    pub(crate) connector: TlsConnector,
     pub(crate) acceptor: TlsAcceptor,
 }
 
@@ -118,6 +117,7 @@ impl Tls {
         let secret = PrivateKeyDer::from_pem_slice(key).map_err(|_| BadTls::Key("not PEM"))?;
 
         let provider = Arc::new(ring::default_provider());
+        let roots = Arc::new(roots);
         let identity = match CertifiedKey::from_der(chain.clone(), secret, &provider) {
             Ok(identity) => identity,
             Err(rustls::Error::InconsistentKeys(_)) => return Err(BadTls::Mismatch),
@@ -126,26 +126,32 @@ impl Tls {
             }
             Err(_) => return Err(BadTls::Key("of no kind that is known here")),
         };
-        let verifier = WebPkiClientVerifier::builder_with_provider(roots.into(), provider.clone())
+        let verifier = WebPkiClientVerifier::builder_with_provider(roots.clone(), provider.clone())
             .build()
             .map_err(|_| BadTls::Authority("not a certificate"))?;
         let (own, between) = chain.split_first().ok_or(BadTls::Certificate("not PEM"))?;
         let verified = verifier.verify_client_cert(own, between, UnixTime::now());
         verified.map_err(|error| BadTls::of(&error))?;
 
-        let mut server = ServerConfig::builder_with_provider(provider)
-            .with_protocol_versions(&[&rustls::version::TLS13])
-            .map_err(|_| BadTls::Key("of no kind that is known here"))?
+        // Whatever the peers run, it is the same version of this.
+        let version = [&rustls::version::TLS13];
+        let unusable = |_| BadTls::Key("of no kind that is known here");
+        let identity = Arc::new(SingleCertAndKey::from(identity));
+        let mut server = ServerConfig::builder_with_provider(provider.clone())
+            .with_protocol_versions(&version)
+            .map_err(unusable)?
             .with_client_cert_verifier(verifier)
-            .with_cert_resolver(Arc::new(SingleCertAndKey::from(identity)));
+            .with_cert_resolver(identity.clone());
+        let mut client = ClientConfig::builder_with_provider(provider)
+            .with_protocol_versions(&version)
+            .map_err(unusable)?
+            .with_root_certificates(roots)
+            .with_client_cert_resolver(identity);
         server.alpn_protocols = vec![b"h2".to_vec()];
-        let client = ClientTlsConfig::new()
-            .ca_certificate(Certificate::from_pem(authority))
-            .identity(Identity::from_pem(certificate, key))
-            .timeout(HANDSHAKE);
+        client.alpn_protocols = vec![b"h2".to_vec()];
         Ok(Self {
             roles: roles(own),
-            client,
+            connector: TlsConnector::from(Arc::new(client)),
             acceptor: TlsAcceptor::from(Arc::new(server)),
         })
     }

@@ -1,12 +1,20 @@
 //! Connections, the same everywhere: how one is made, kept alive and given up, plain or with TLS, and
 //! what it means that one failed. Who connects to whom, and when, is decided elsewhere.
 
+use std::io;
 use std::time::Duration;
 
-use tokio::net::TcpListener;
+use hyper_util::rt::TokioIo;
+use tokio::io::AsyncBufReadExt;
+use tokio::net::{TcpListener, TcpStream};
+use tokio_rustls::TlsConnector;
+use tokio_rustls::client::TlsStream;
+use tokio_rustls::rustls::pki_types::ServerName;
 use tokio_rustls::rustls::{self, AlertDescription, CertificateError};
+use tonic::codegen::http::Uri;
 use tonic::transport::server::{Router, TcpIncoming};
-use tonic::transport::{Endpoint, Server};
+use tonic::transport::{Channel, Endpoint, Server};
+use tower::Service;
 
 use crate::accept;
 use crate::tls::{Role, Tls};
@@ -20,26 +28,66 @@ const KEEPALIVE: Duration = Duration::from_secs(5);
 /// How long the answer to such a try may take.
 const ANSWER: Duration = Duration::from_secs(10);
 
-/// The way to a peer at `address`, `host:port`, who has to prove that role if there is TLS.
+/// The way to `address`, `host:port`.
 ///
 /// # Errors
 /// The address cannot be one.
-pub fn endpoint(
-    address: &str,
-    role: Role,
-    tls: Option<&Tls>,
-) -> Result<Endpoint, tonic::transport::Error> {
-    let endpoint = match tls {
-        None => Endpoint::from_shared(format!("http://{address}"))?,
-        Some(tls) => Endpoint::from_shared(format!("https://{address}"))?
-            .tls_config(tls.client.clone().domain_name(role.dns_name()))?,
-    };
-    Ok(endpoint
+pub fn endpoint(address: &str) -> Result<Endpoint, tonic::transport::Error> {
+    Ok(Endpoint::from_shared(format!("http://{address}"))?
         .connect_timeout(CONNECT)
         .http2_keep_alive_interval(KEEPALIVE)
         .keep_alive_timeout(ANSWER)
         .tcp_keepalive(Some(KEEPALIVE))
         .tcp_nodelay(true))
+}
+
+/// Connects to a peer, who has to prove that role if there is TLS.
+///
+/// # Errors
+/// Nobody answers, or one end does not trust the other; [`Trouble`] tells which.
+pub async fn connect(
+    to: &Endpoint,
+    role: Role,
+    tls: Option<&Tls>,
+) -> Result<Channel, tonic::transport::Error> {
+    match tls {
+        None => to.connect().await,
+        Some(tls) => to.connect_with_connector(connector(to, role, tls)).await,
+    }
+}
+
+/// As [`connect`], at the first call, and again when the connection is lost.
+pub fn connect_lazily(to: &Endpoint, role: Role, tls: Option<&Tls>) -> Channel {
+    match tls {
+        None => to.connect_lazy(),
+        Some(tls) => to.connect_with_connector_lazy(connector(to, role, tls)),
+    }
+}
+
+/// What tonic is given to connect with TLS.
+fn connector(
+    to: &Endpoint,
+    role: Role,
+    tls: &Tls,
+) -> impl Service<Uri, Response = Io, Error = io::Error, Future: Send> + Send + use<> {
+    let address = to.uri().authority().map_or("", |a| a.as_str()).to_owned();
+    let connector = tls.connector.clone();
+    tower::service_fn(move |_| dial(address.clone(), role, connector.clone()))
+}
+
+type Io = TokioIo<TlsStream<TcpStream>>;
+
+async fn dial(address: String, role: Role, connector: TlsConnector) -> io::Result<Io> {
+    let socket = TcpStream::connect(&address).await?;
+    socket.set_nodelay(true)?;
+    let name = ServerName::try_from(role.dns_name()).map_err(io::Error::other)?;
+    let mut stream = connector.connect(name, socket).await?;
+    // With TLS 1.3 the other end judges this one's certificate after this one is done. Whatever it says
+    // first, it says to both; left to a call, its refusal would be one closed connection among others.
+    if stream.fill_buf().await?.is_empty() {
+        return Err(io::ErrorKind::UnexpectedEof.into());
+    }
+    Ok(TokioIo::new(stream))
 }
 
 /// A server without services yet.
@@ -92,10 +140,6 @@ impl Trouble {
             return Self::Untrusted(why);
         }
         let text = all().last().map_or_else(String::new, ToString::to_string);
-        // Past the handshake only the text of an alert comes through.
-        if let Some(alert) = all().find_map(|e| alert(&e.to_string())) {
-            return Self::Untrusted(alert.to_owned());
-        }
         let connected = !all().any(|e| e.is::<tonic::ConnectError>());
         if tls.is_none() && connected {
             return Self::Unreachable(format!(
@@ -115,12 +159,7 @@ impl Trouble {
 
 /// The TLS error within an error.
 fn rustls_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a rustls::Error> {
-    let within = || {
-        error
-            .downcast_ref::<std::io::Error>()?
-            .get_ref()?
-            .downcast_ref()
-    };
+    let within = || error.downcast_ref::<io::Error>()?.get_ref()?.downcast_ref();
     error.downcast_ref().or_else(within)
 }
 
@@ -164,17 +203,4 @@ fn refusal(alert: AlertDescription) -> &'static str {
         }
         _ => "it refuses the certificate shown to it",
     }
-}
-
-/// What the other end meant, from the text of an error.
-fn alert(text: &str) -> Option<&'static str> {
-    let (_, name) = text.split_once("received fatal alert: ")?;
-    let known = [
-        AlertDescription::CertificateRequired,
-        AlertDescription::CertificateExpired,
-        AlertDescription::UnknownCA,
-        AlertDescription::DecryptError,
-    ];
-    let alert = known.into_iter().find(|a| name.contains(&format!("{a:?}")));
-    Some(alert.map_or("it refuses the certificate shown to it", refusal))
 }

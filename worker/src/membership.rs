@@ -83,11 +83,12 @@ pub(crate) async fn keep(
 }
 
 fn connect(config: &Config) -> Result<MasterClient<Channel>> {
-    let endpoint = transport::endpoint(&config.master, Role::Master, config.tls.as_ref());
-    let endpoint = endpoint.map_err(|_| Error::Address {
+    let endpoint = transport::endpoint(&config.master).map_err(|_| Error::Address {
         address: config.master.clone(),
     })?;
-    Ok(MasterClient::new(endpoint.timeout(DEADLINE).connect_lazy()))
+    let endpoint = endpoint.timeout(DEADLINE);
+    let channel = transport::connect_lazily(&endpoint, Role::Master, config.tls.as_ref());
+    Ok(MasterClient::new(channel))
 }
 
 /// Why the master says nothing; an error if it never will.
