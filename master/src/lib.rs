@@ -74,8 +74,7 @@ pub fn start(
         .max_encoding_message_size(MAX_MESSAGE);
     let failed = |e| Error::Serve(Arc::new(e));
     let serving = tokio::spawn(async move {
-        let services = transport::server().add_service(service);
-        let server = transport::serve(services, listener, tls.as_ref(), shutdown.cancelled());
+        let server = transport::serve(service, listener, tls.as_ref(), shutdown.cancelled());
         let mut server = std::pin::pin!(server);
         tokio::select! {
             served = &mut server => return served.map_err(failed),

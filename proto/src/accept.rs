@@ -3,6 +3,7 @@
 
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -14,6 +15,7 @@ use tokio_rustls::server::TlsStream;
 use tokio_stream::wrappers::ReceiverStream;
 use tracing::{debug, warn};
 
+use crate::refused::Refused;
 use crate::tls::HANDSHAKE;
 
 /// Handshakes under way at once; further callers wait in the system's queue.
@@ -32,13 +34,22 @@ const LINGER_BYTES: usize = 1 << 16;
 type Accepted = std::io::Result<TlsStream<TcpStream>>;
 
 /// Connections whose handshake is done, until the stream is dropped.
-pub(crate) fn secured(listener: TcpListener, acceptor: TlsAcceptor) -> ReceiverStream<Accepted> {
+pub(crate) fn secured(
+    listener: TcpListener,
+    acceptor: TlsAcceptor,
+    refused: Arc<Refused>,
+) -> ReceiverStream<Accepted> {
     let (ready, stream) = mpsc::channel(WAITING);
-    tokio::spawn(accept(listener, acceptor, ready));
+    tokio::spawn(accept(listener, acceptor, ready, refused));
     ReceiverStream::new(stream)
 }
 
-async fn accept(listener: TcpListener, acceptor: TlsAcceptor, ready: mpsc::Sender<Accepted>) {
+async fn accept(
+    listener: TcpListener,
+    acceptor: TlsAcceptor,
+    ready: mpsc::Sender<Accepted>,
+    refused: Arc<Refused>,
+) {
     let slots = Arc::new(Semaphore::new(HANDSHAKES));
     loop {
         let next = async {
@@ -58,9 +69,9 @@ async fn accept(listener: TcpListener, acceptor: TlsAcceptor, ready: mpsc::Sende
                 continue;
             }
         };
-        let (acceptor, ready) = (acceptor.clone(), ready.clone());
+        let (acceptor, ready, refused) = (acceptor.clone(), ready.clone(), refused.clone());
         tokio::spawn(async move {
-            if let Some(stream) = handshake(socket, peer, &acceptor).await {
+            if let Some(stream) = handshake(socket, peer, &acceptor, &refused).await {
                 // The server may have stopped.
                 let _ = ready.send(Ok(stream)).await;
             }
@@ -73,24 +84,25 @@ async fn handshake(
     socket: TcpStream,
     peer: SocketAddr,
     acceptor: &TlsAcceptor,
+    refused: &Refused,
 ) -> Option<TlsStream<TcpStream>> {
     if let Err(error) = socket.set_nodelay(true) {
         debug!(%peer, %error, "no TCP_NODELAY");
     }
     let accepting = acceptor.accept(socket).into_fallible();
-    match timeout(HANDSHAKE, accepting).await {
-        Ok(Ok(stream)) => Some(stream),
-        Ok(Err((reason, socket))) => {
-            warn!(%peer, %reason, "connection refused");
-            // Closing with something unread would be a reset, and might overtake the reason.
-            let _ = timeout(LINGER, linger(socket)).await;
-            None
-        }
-        Err(_) => {
-            warn!(%peer, reason = "no handshake in time", "connection refused");
-            None
-        }
+    let outcome = timeout(HANDSHAKE, accepting).await;
+    if let Ok(Ok(stream)) = outcome {
+        return Some(stream);
     }
+    refused.connections.fetch_add(1, Ordering::Relaxed);
+    if let Ok(Err((reason, socket))) = outcome {
+        warn!(%peer, %reason, "connection refused");
+        // Closing with something unread would be a reset, and might overtake the reason.
+        let _ = timeout(LINGER, linger(socket)).await;
+    } else {
+        warn!(%peer, reason = "no handshake in time", "connection refused");
+    }
+    None
 }
 
 /// Lets the other end read the reason: what it has sent meanwhile goes unread until it closes.

@@ -11,6 +11,7 @@ mod error;
 mod task;
 
 mod accept;
+mod refused;
 pub mod tls;
 pub mod transport;
 

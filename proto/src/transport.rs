@@ -1,7 +1,9 @@
 //! Connections, the same everywhere: how one is made, kept alive and given up, plain or with TLS, and
 //! what it means that one failed. Who connects to whom, and when, is decided elsewhere.
 
+use std::convert::Infallible;
 use std::io;
+use std::sync::Arc;
 use std::time::Duration;
 
 use hyper_util::rt::TokioIo;
@@ -11,12 +13,16 @@ use tokio_rustls::TlsConnector;
 use tokio_rustls::client::TlsStream;
 use tokio_rustls::rustls::pki_types::ServerName;
 use tokio_rustls::rustls::{self, AlertDescription, CertificateError};
-use tonic::codegen::http::Uri;
-use tonic::transport::server::{Router, TcpIncoming};
+use tonic::body::Body;
+use tonic::codegen::http::{Request, Response, Uri};
+use tonic::server::NamedService;
+use tonic::transport::server::TcpIncoming;
 use tonic::transport::{Channel, Endpoint, Server};
 use tower::Service;
+use tower::util::MapResponseLayer;
 
 use crate::accept;
+use crate::refused::Refused;
 use crate::tls::{Role, Tls};
 
 /// Longest time to connect.
@@ -90,37 +96,53 @@ async fn dial(address: String, role: Role, connector: TlsConnector) -> io::Resul
     Ok(TokioIo::new(stream))
 }
 
-/// A server without services yet.
-pub fn server() -> Server {
-    Server::builder()
-        .http2_keepalive_interval(Some(KEEPALIVE))
-        .http2_keepalive_timeout(Some(ANSWER))
-}
-
-/// Serves on `listener` until `shutdown` and the end of all open calls.
+/// Serves on `listener` until `shutdown` and the end of all open calls; then the log is told what was
+/// refused.
 ///
 /// # Errors
 /// The listener is gone.
-pub async fn serve(
-    services: Router,
+pub async fn serve<S>(
+    service: S,
     listener: TcpListener,
     tls: Option<&Tls>,
     shutdown: impl Future<Output = ()>,
-) -> Result<(), tonic::transport::Error> {
-    match tls {
+) -> Result<(), tonic::transport::Error>
+where
+    S: Service<
+            Request<Body>,
+            Response = Response<Body>,
+            Error = Infallible,
+            Future: Send + 'static,
+        > + NamedService
+        + Clone
+        + Send
+        + Sync
+        + 'static,
+{
+    let refused = Arc::new(Refused::default());
+    let counting = refused.clone();
+    let services = Server::builder()
+        .http2_keepalive_interval(Some(KEEPALIVE))
+        .http2_keepalive_timeout(Some(ANSWER))
+        .layer(MapResponseLayer::new(move |response: Response<Body>| {
+            counting.count(&response);
+            response
+        }))
+        .add_service(service);
+    let served = match tls {
         None => {
             let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-            services
-                .serve_with_incoming_shutdown(incoming, shutdown)
-                .await
+            let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
+            serving.await
         }
         Some(tls) => {
-            let incoming = accept::secured(listener, tls.acceptor.clone());
-            services
-                .serve_with_incoming_shutdown(incoming, shutdown)
-                .await
+            let incoming = accept::secured(listener, tls.acceptor.clone(), refused.clone());
+            let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
+            serving.await
         }
-    }
+    };
+    refused.tell();
+    served
 }
 
 /// Why there is no connection, in words.

@@ -65,11 +65,10 @@ pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationTo
     let service = WorkerServer::new(service)
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
-    let services = transport::server().add_service(service);
     let (tls, stopped) = (config.tls.clone(), shutdown.clone().cancelled_owned());
     let serving =
         tokio::spawn(
-            async move { transport::serve(services, listener, tls.as_ref(), stopped).await },
+            async move { transport::serve(service, listener, tls.as_ref(), stopped).await },
         );
     let outcome = membership::keep(&config, &address, &shutdown).await;
     // Membership is what a worker lives for: without it there is nobody to serve.
