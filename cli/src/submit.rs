@@ -2,7 +2,7 @@
 
 use horma_core::{Job, Part, Record, SubTrajectory, Trajectory, stitch};
 use horma_master::{Outcome, Progress};
-use horma_proto::transport::{self, Trouble};
+use horma_proto::transport::{self, Trouble, WANTS_TLS};
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::submit_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
@@ -25,15 +25,18 @@ pub(crate) async fn run(
     };
     let endpoint = transport::endpoint(address).map_err(bad_address)?;
     let connected = transport::connect(&endpoint, Role::Master, tls).await;
-    let channel = connected.map_err(|e| silence(address, &e, tls))?;
+    let channel = connected.map_err(|e| silence(address, &e))?;
     let mut client = MasterClient::new(channel)
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
 
     progress("send", 0, 0);
-    let failed = |status: Status| refusal(address, &status, tls);
+    let failed = |status: Status| refusal(address, &status);
     let replies = client.submit(tokio_stream::iter(requests(part, job)));
-    let mut replies = replies.await.map_err(failed)?.into_inner();
+    let mut replies = replies
+        .await
+        .map_err(|s| wants_tls(failed(s), tls))?
+        .into_inner();
     let bad = |reason: String| Error::BadReply {
         address: address.to_owned(),
         reason,
@@ -85,7 +88,7 @@ fn phase(name: &str) -> &'static str {
 }
 
 /// What the master's status means for the user.
-fn refusal(address: &str, status: &Status, tls: Option<&Tls>) -> Error {
+fn refusal(address: &str, status: &Status) -> Error {
     let (to, reason) = (address.to_owned(), status.message().to_owned());
     match Answer::of(status) {
         Answer::Wrong => Error::Refused {
@@ -104,15 +107,28 @@ fn refusal(address: &str, status: &Status, tls: Option<&Tls>) -> Error {
             address: to,
             reason,
         },
-        Answer::Stranger | Answer::Silence => silence(address, status, tls),
+        Answer::Stranger | Answer::Silence => silence(address, status),
+    }
+}
+
+/// A plain connection that gave no first answer may have been made to a port with TLS.
+fn wants_tls(error: Error, tls: Option<&Tls>) -> Error {
+    match error {
+        Error::NoMaster { address, reason } if tls.is_none() => Error::NoMaster {
+            address,
+            reason: format!("{reason}; {WANTS_TLS}"),
+        },
+        other => other,
     }
 }
 
 /// What it means that there is no answer.
-fn silence(address: &str, error: &(dyn std::error::Error + 'static), tls: Option<&Tls>) -> Error {
+fn silence(address: &str, error: &(dyn std::error::Error + 'static)) -> Error {
     let address = address.to_owned();
-    match Trouble::of(error, Role::Master, tls) {
+    match Trouble::of(error, Role::Master) {
         Trouble::Untrusted(reason) => Error::Untrusted { address, reason },
-        Trouble::Unreachable(reason) => Error::NoMaster { address, reason },
+        Trouble::Unreachable(reason) | Trouble::Broken(reason) => {
+            Error::NoMaster { address, reason }
+        }
     }
 }

@@ -79,7 +79,7 @@ pub(crate) async fn dispatch(
 async fn call(attempt: &Attempt, received: &mut SubTrajectory) -> Result<ExtentRecord, Fault> {
     let begin = Instant::now();
     let tls = attempt.tls.as_ref();
-    let lost = |e: tonic::transport::Error| lost(&e, tls);
+    let lost = |e: tonic::transport::Error| lost(&e);
     let endpoint = transport::endpoint(&attempt.address).map_err(lost)?;
     let channel = transport::connect(&endpoint, Role::Worker, tls)
         .await
@@ -89,7 +89,7 @@ async fn call(attempt: &Attempt, received: &mut SubTrajectory) -> Result<ExtentR
         .max_encoding_message_size(MAX_MESSAGE);
     let sent = Arc::new(AtomicU64::new(0));
     let replies = client.digitize(requests(attempt, sent.clone())).await;
-    let mut replies = replies.map_err(|s| fault(&s, tls))?.into_inner();
+    let mut replies = replies.map_err(|s| fault(&s))?.into_inner();
     let (finished, bytes_received) = receive(attempt, received, &mut replies).await?;
     let counters = finished.counters.unwrap_or_default();
     Ok(ExtentRecord {
@@ -143,9 +143,8 @@ async fn receive(
 ) -> Result<(wire::Finished, u64), Fault> {
     let wrong = |error: Error| Fault::Wrong(error.to_string());
     let total = attempt.plan.trajectory.positions;
-    let tls = attempt.tls.as_ref();
     let mut bytes = 0;
-    while let Some(reply) = replies.message().await.map_err(|s| fault(&s, tls))? {
+    while let Some(reply) = replies.message().await.map_err(|s| fault(&s))? {
         bytes += reply.encoded_len() as u64;
         let id: TaskId = reply.id.try_into().map_err(wrong)?;
         if id != attempt.task {
@@ -188,10 +187,10 @@ async fn receive(
 
 /// What a status says of the worker. Only an answer about the content is the worker's fault; a
 /// partition may show as almost anything else.
-fn fault(status: &Status, tls: Option<&Tls>) -> Fault {
+fn fault(status: &Status) -> Fault {
     match Answer::of(status) {
         Answer::Wrong => Fault::Wrong(status.message().to_owned()),
-        Answer::Silence => lost(status, tls),
+        Answer::Silence => lost(status),
         Answer::Impossible | Answer::Failed | Answer::Forbidden | Answer::Stranger => {
             Fault::Lost(status.message().to_owned())
         }
@@ -199,10 +198,10 @@ fn fault(status: &Status, tls: Option<&Tls>) -> Fault {
 }
 
 /// The worker cannot be reached, or not be trusted to be one.
-fn lost(error: &(dyn std::error::Error + 'static), tls: Option<&Tls>) -> Fault {
-    match Trouble::of(error, Role::Worker, tls) {
+fn lost(error: &(dyn std::error::Error + 'static)) -> Fault {
+    match Trouble::of(error, Role::Worker) {
         Trouble::Untrusted(reason) => Fault::Lost(format!("it is not trusted: {reason}")),
-        Trouble::Unreachable(_) => Fault::Lost(chain(error)),
+        Trouble::Unreachable(_) | Trouble::Broken(_) => Fault::Lost(chain(error)),
     }
 }
 

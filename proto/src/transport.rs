@@ -145,36 +145,32 @@ where
     served
 }
 
+/// What may help where a plain connection broke before anything was heard.
+pub const WANTS_TLS: &str = "if it wants TLS, give --tls-ca, --tls-cert and --tls-key";
+
 /// Why there is no connection, in words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Trouble {
     /// One of the two ends does not trust the other: no second try will help.
     Untrusted(String),
-    /// Nobody is there, or what is between is broken: another try may help.
+    /// Nobody is there: another try may help.
     Unreachable(String),
+    /// Somebody was there, and then not any more: another try may help.
+    Broken(String),
 }
 
 impl Trouble {
-    /// What it means that a connection to a peer of that role failed with this error.
-    pub fn of(error: &(dyn std::error::Error + 'static), role: Role, tls: Option<&Tls>) -> Self {
+    /// What it means that a connection to a peer of that role, or a call on it, failed with this error.
+    pub fn of(error: &(dyn std::error::Error + 'static), role: Role) -> Self {
         let all = || std::iter::successors(Some(error), |e| e.source());
         if let Some(why) = all().find_map(rustls_error).and_then(|e| distrust(e, role)) {
             return Self::Untrusted(why);
         }
         let text = all().last().map_or_else(String::new, ToString::to_string);
-        let connected = !all().any(|e| e.is::<tonic::ConnectError>());
-        if tls.is_none() && connected {
-            return Self::Unreachable(format!(
-                "{text}; if it wants TLS, give --tls-ca, --tls-cert and --tls-key"
-            ));
-        }
-        Self::Unreachable(text)
-    }
-
-    /// The words.
-    pub fn into_reason(self) -> String {
-        match self {
-            Self::Untrusted(reason) | Self::Unreachable(reason) => reason,
+        if all().any(|e| e.downcast_ref::<tonic::ConnectError>().is_some()) {
+            Self::Unreachable(text)
+        } else {
+            Self::Broken(text)
         }
     }
 }
@@ -187,12 +183,16 @@ fn rustls_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a 
 
 /// Why a handshake ended, if one of the ends wanted it so.
 fn distrust(error: &rustls::Error, role: Role) -> Option<String> {
+    use AlertDescription as A;
     use CertificateError as C;
     let why = match error {
         rustls::Error::InvalidMessage(_) => {
             "it does not speak TLS; give it --tls-ca, --tls-cert and --tls-key, or none of them here"
         }
-        rustls::Error::AlertReceived(alert) => return Some(refusal(*alert).to_owned()),
+        rustls::Error::PeerIncompatible(_)
+        | rustls::Error::AlertReceived(A::ProtocolVersion | A::NoApplicationProtocol) => {
+            "it speaks another TLS"
+        }
         rustls::Error::InvalidCertificate(error) => match error {
             C::NotValidForName | C::NotValidForNameContext { .. } => {
                 return Some(format!("its certificate does not name the role {role}"));
@@ -203,26 +203,21 @@ fn distrust(error: &rustls::Error, role: Role) -> Option<String> {
             }
             _ => "its certificate is not from the authority given",
         },
-        rustls::Error::NoCertificatesPresented => "it shows no certificate",
-        rustls::Error::PeerIncompatible(_) => "it speaks another TLS",
+        rustls::Error::AlertReceived(A::CertificateRequired) => "it demands a certificate",
+        rustls::Error::AlertReceived(A::CertificateExpired) => {
+            "it refuses the certificate shown to it, which has expired by its clock"
+        }
+        rustls::Error::AlertReceived(A::UnknownCA | A::DecryptError) => {
+            "it refuses the certificate shown to it, which is not from its authority"
+        }
+        rustls::Error::AlertReceived(
+            A::BadCertificate
+            | A::UnsupportedCertificate
+            | A::CertificateRevoked
+            | A::CertificateUnknown
+            | A::AccessDenied,
+        ) => "it refuses the certificate shown to it",
         _ => return None,
     };
     Some(why.to_owned())
-}
-
-/// What the other end meant by an alert.
-fn refusal(alert: AlertDescription) -> &'static str {
-    match alert {
-        AlertDescription::CertificateRequired => "it demands a certificate",
-        AlertDescription::CertificateExpired => {
-            "it refuses the certificate shown to it, which has expired by its clock"
-        }
-        AlertDescription::UnknownCA | AlertDescription::DecryptError => {
-            "it refuses the certificate shown to it, which is not from its authority"
-        }
-        AlertDescription::ProtocolVersion | AlertDescription::NoApplicationProtocol => {
-            "it speaks another TLS"
-        }
-        _ => "it refuses the certificate shown to it",
-    }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use horma_proto::transport::{self, Trouble};
+use horma_proto::transport::{self, Trouble, WANTS_TLS};
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::{HeartbeatRequest, RegisterRequest};
 use horma_proto::{Answer, Role, VERSION};
@@ -47,7 +47,7 @@ pub(crate) async fn keep(
             };
             let reason = match Answer::of(&silence) {
                 Answer::Stranger => continue,
-                Answer::Silence => silent(config, &silence)?,
+                Answer::Silence => silent(config, &silence, heard.is_some())?,
                 Answer::Forbidden => {
                     return Err(Error::Untrusted {
                         address: config.master.clone(),
@@ -92,9 +92,12 @@ fn connect(config: &Config) -> Result<MasterClient<Channel>> {
 }
 
 /// Why the master says nothing; an error if it never will.
-fn silent(config: &Config, status: &Status) -> Result<String> {
-    match Trouble::of(status, Role::Master, config.tls.as_ref()) {
-        Trouble::Unreachable(reason) => Ok(reason),
+fn silent(config: &Config, status: &Status, heard: bool) -> Result<String> {
+    match Trouble::of(status, Role::Master) {
+        Trouble::Broken(reason) if config.tls.is_none() && !heard => {
+            Ok(format!("{reason}; {WANTS_TLS}"))
+        }
+        Trouble::Broken(reason) | Trouble::Unreachable(reason) => Ok(reason),
         Trouble::Untrusted(reason) => Err(Error::Untrusted {
             address: config.master.clone(),
             reason,
