@@ -173,3 +173,42 @@ impl Answer {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_means_the_same_at_both_ends() {
+        let worker = || "w".to_owned();
+        let cases = [
+            (Error::Malformed("x".to_owned()), Answer::Wrong),
+            (Error::TooLarge { bytes: 2, limit: 1 }, Answer::Wrong),
+            (
+                Error::Checksum {
+                    found: 1,
+                    expected: 2,
+                },
+                Answer::Wrong,
+            ),
+            (Error::JobFailed("x".to_owned()), Answer::Failed),
+            (Error::Distrusted { worker: worker() }, Answer::Failed),
+            (Error::Unproven, Answer::Forbidden),
+            (
+                Error::Forbidden {
+                    role: Role::Worker,
+                    found: "no role".to_owned(),
+                },
+                Answer::Forbidden,
+            ),
+            (Error::UnknownWorker { worker: worker() }, Answer::Stranger),
+            (Error::ShuttingDown("the master"), Answer::Silence),
+            (Error::TooSlow { seconds: 30 }, Answer::Silence),
+        ];
+        for (error, expected) in cases {
+            let status = Status::from(error.clone());
+            assert_eq!(Answer::of(&status), expected, "{error}");
+            assert_eq!(status.message(), error.to_string());
+        }
+    }
+}
