@@ -316,7 +316,7 @@ async fn workers_that_answer_wrongly_are_found_out() {
         let again = register(&address, "a liar", horma_proto::VERSION, address.clone()).await;
         assert_eq!(
             again.expect_err("refused").code(),
-            tonic::Code::PermissionDenied
+            tonic::Code::FailedPrecondition
         );
     }
 }

@@ -14,10 +14,11 @@ Start with:
   horma run demo/job.toml -o out        digitize it in this process
   horma run demo/job.toml -o out -w 2   the same on two worker processes: the same bytes
 
-Across machines:
-  horma master --bind 10.0.0.1:7171 --insecure       on one
-  horma worker --master 10.0.0.1:7171 --bind 0.0.0.0:0 --insecure   on every other
-  horma submit job.toml --master 10.0.0.1:7171 -o out
+Across machines, each with its certificate:
+  horma certs certs                     a test authority, and certificates for every role
+  horma master --bind 10.0.0.1:7171 --tls-ca ca.pem --tls-cert master.pem --tls-key master.key
+  horma worker --master 10.0.0.1:7171 --bind 0.0.0.0:0 --tls-ca ca.pem ...     on every other
+  horma submit job.toml --master 10.0.0.1:7171 -o out --tls-ca ca.pem ...
 
 Lengths are in mm, angles in degrees. Flags go over HORMA_* variables, these over the job file.
 
@@ -57,6 +58,14 @@ pub(crate) enum Command {
     Master(Master),
     /// Serve as a worker of a master
     Worker(Worker),
+    /// Make a test authority, and certificates of it for a master, workers and clients
+    ///
+    /// For tests and small private networks: one certificate serves all workers, the authority's key
+    /// lies beside them unencrypted, and nothing can be revoked. Where there is an authority already,
+    /// have it sign certificates with these DNS names instead: master.horma.internal,
+    /// worker.horma.internal, client.horma.internal. Each name is a role; a certificate may have
+    /// several.
+    Certs(Certs),
     /// Write a sample job with a shoe last and its holders
     Init {
         /// Where to write; created if missing
@@ -124,6 +133,38 @@ pub(crate) struct Submit {
     /// Where the master listens
     #[arg(long, value_name = "HOST:PORT", env = "HORMA_MASTER")]
     pub master: String,
+    #[command(flatten)]
+    pub tls: Tls,
+}
+
+/// What proves who is who. With it all traffic is encrypted, and both ends of every connection show a
+/// certificate of the same authority.
+#[derive(Debug, Args)]
+pub(crate) struct Tls {
+    /// Certificate of the authority whose certificates count, PEM
+    #[arg(long, value_name = "FILE", env = "HORMA_TLS_CA", requires_all = ["tls_cert", "tls_key"], help_heading = "Encrypted, both ends authenticated")]
+    pub tls_ca: Option<PathBuf>,
+    /// This process's certificate, with those in between if there are any, PEM; its DNS names tell its
+    /// roles
+    #[arg(long, value_name = "FILE", env = "HORMA_TLS_CERT", requires_all = ["tls_ca", "tls_key"], help_heading = "Encrypted, both ends authenticated")]
+    pub tls_cert: Option<PathBuf>,
+    /// The certificate's private key, PEM
+    #[arg(long, value_name = "FILE", env = "HORMA_TLS_KEY", requires_all = ["tls_ca", "tls_cert"], help_heading = "Encrypted, both ends authenticated")]
+    pub tls_key: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Certs {
+    /// Where to write; created if missing. What is there already is never written over
+    #[arg(value_name = "DIR")]
+    pub directory: PathBuf,
+    /// Days until the certificates expire
+    #[arg(long, value_name = "N", default_value_t = 365, value_parser = clap::value_parser!(u32).range(1..=36500))]
+    pub days: u32,
+    /// Host name or address for the certificates of master and workers to name as well, for other
+    /// programs; horma itself goes by roles. May be repeated
+    #[arg(long, value_name = "NAME")]
+    pub name: Vec<String>,
 }
 
 /// A job, where its results go, and what it says differently this time.
@@ -317,8 +358,10 @@ pub(crate) struct Master {
     )]
     pub bind: String,
     /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated
-    #[arg(long)]
+    #[arg(long, conflicts_with = "tls_ca")]
     pub insecure: bool,
+    #[command(flatten)]
+    pub tls: Tls,
     /// After how long a silence a worker counts as lost, seconds
     #[arg(long, value_name = "S", env = "HORMA_LEASE", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
     pub lease: u64,
@@ -352,8 +395,10 @@ pub(crate) struct Worker {
     #[arg(long, value_name = "HOST:PORT", env = "HORMA_ADVERTISE")]
     pub advertise: Option<String>,
     /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated
-    #[arg(long)]
+    #[arg(long, conflicts_with = "tls_ca")]
     pub insecure: bool,
+    #[command(flatten)]
+    pub tls: Tls,
     /// Name of this worker, the same after a restart [default: host name and process number]
     #[arg(long, env = "HORMA_WORKER_ID")]
     pub id: Option<String>,

@@ -46,6 +46,8 @@ pub(crate) async fn run(
         regroup: REGROUP,
         max_part: 0,
         memory: system::memory(),
+        // Master and workers talk within this machine.
+        tls: None,
     };
     let shutdown = CancellationToken::new();
     let _stopped = shutdown.clone().drop_guard();
@@ -95,6 +97,9 @@ fn spawn(id: &str, master: &str, threads: usize, simd: Simd) -> Result<Child> {
         .args(["--threads", &threads.to_string()])
         .args(["--simd", &simd.to_string()])
         .env_remove("HORMA_ADVERTISE")
+        .env_remove("HORMA_TLS_CA")
+        .env_remove("HORMA_TLS_CERT")
+        .env_remove("HORMA_TLS_KEY")
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .kill_on_drop(true);

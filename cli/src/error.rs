@@ -19,9 +19,28 @@ pub(crate) enum Error {
         source: std::io::Error,
     },
     #[error(
-        "{address} is reachable from other machines, and traffic is neither encrypted nor authenticated; add --insecure if you trust that network"
+        "{address} is reachable from other machines, and traffic is neither encrypted nor authenticated; give --tls-ca, --tls-cert and --tls-key (`horma certs` makes some), or add --insecure if you trust that network"
     )]
     Exposed { address: String },
+    #[error("{flag} {}: {reason}", file.display())]
+    Tls {
+        flag: &'static str,
+        file: PathBuf,
+        reason: String,
+    },
+    #[error("{} is there already; give an empty directory, or move it away", file.display())]
+    CertExists { file: PathBuf },
+    #[error("{} cannot be written: {source}", file.display())]
+    CertWrite {
+        file: PathBuf,
+        source: std::io::Error,
+    },
+    #[error("--name {name:?} cannot go into a certificate: {reason}")]
+    CertName { name: String, reason: String },
+    #[error("cannot make certificates: {0}")]
+    Certs(#[from] rcgen::Error),
+    #[error("the master at {address} and this command do not trust each other: {reason}")]
+    Untrusted { address: String, reason: String },
     #[error("cannot start a worker from {}: {source}", program.display())]
     Spawn {
         program: PathBuf,
@@ -93,10 +112,17 @@ impl Error {
             Self::Formats(_)
             | Self::Bind { .. }
             | Self::Exposed { .. }
+            | Self::Tls { .. }
+            | Self::CertExists { .. }
+            | Self::CertWrite { .. }
+            | Self::CertName { .. }
+            | Self::Untrusted { .. }
             | Self::Address { .. }
             | Self::Refused { .. }
             | Self::OneProcess
-            | Self::Worker(horma_worker::Error::Address { .. }) => 2,
+            | Self::Worker(
+                horma_worker::Error::Address { .. } | horma_worker::Error::Untrusted { .. },
+            ) => 2,
             Self::Master(_)
             | Self::Worker(_)
             | Self::Spawn { .. }
@@ -104,6 +130,7 @@ impl Error {
             | Self::NoMaster { .. }
             | Self::JobFailed { .. }
             | Self::BadReply { .. }
+            | Self::Certs(_)
             | Self::Threads(_) => 4,
             Self::Interrupted => 130,
         }

@@ -10,9 +10,11 @@ mod run;
 mod cluster;
 mod here;
 mod submit;
+mod tls;
 mod verify;
 
 mod bench;
+mod certs;
 mod inspect;
 mod serve;
 
@@ -69,6 +71,7 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Verify(args) => verify::verify(&args),
         Command::Master(master) => serve::master(&master),
         Command::Worker(worker) => serve::worker(worker),
+        Command::Certs(certs) => certs::certs(&certs),
         Command::Init { directory } => inspect::init(&directory),
         Command::Inspect { files } => inspect::inspect(&files),
         Command::Bench(args::Bench::Kernel(bench)) => bench::kernel(&bench),

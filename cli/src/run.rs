@@ -19,7 +19,7 @@ use crate::args;
 use crate::error::{Error, Result};
 use crate::progress::Display;
 use crate::serve::{NOTICE, runtime};
-use crate::{cluster, here, say, submit, system, verify};
+use crate::{cluster, here, say, submit, system, tls, verify};
 
 /// Computes a job in this process or on local workers.
 pub(crate) fn run(args: &args::Run) -> Result<()> {
@@ -45,13 +45,15 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
 
 /// Has a job computed by a master elsewhere.
 pub(crate) fn submit(args: &args::Submit) -> Result<()> {
+    let tls = tls::load(&args.tls)?;
     perform(&args.job, None, None, async |part, file, display, _| {
         if let Method::Local(local) = file.job.method
             && local.needs_whole_path()
         {
             return Err(Error::OneProcess);
         }
-        submit::run(part, file.job, &args.master, progress(display)).await
+        let (job, progress) = (file.job, progress(display));
+        submit::run(part, job, &args.master, tls.as_ref(), progress).await
     })
 }
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use horma_core::Simd;
 use horma_master::Config;
+use horma_proto::Role;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
@@ -11,13 +12,15 @@ use tokio_util::sync::CancellationToken;
 use crate::args::{Master, Worker};
 use crate::cluster::bind;
 use crate::error::{Error, Result};
-use crate::{say, system};
+use crate::{say, system, tls};
 
 /// How long threads may take to notice that the process ends.
 pub(crate) const NOTICE: Duration = Duration::from_secs(2);
 
 /// Serves as a master until it is told to stop.
 pub(crate) fn master(args: &Master) -> Result<()> {
+    let tls = tls::load_as(&args.tls, Role::Master)?;
+    let trusted = tls.is_some() || args.insecure;
     let config = Config {
         heartbeat: Duration::from_secs(args.lease) / 5,
         lease: Duration::from_secs(args.lease),
@@ -25,9 +28,10 @@ pub(crate) fn master(args: &Master) -> Result<()> {
         regroup: Duration::from_secs(args.patience),
         max_part: args.max_part.saturating_mul(1_000_000),
         memory: system::memory(),
+        tls,
     };
     serve(async {
-        let listener = listen(&args.bind, args.insecure).await?;
+        let listener = listen(&args.bind, trusted).await?;
         let shutdown = CancellationToken::new();
         let (_master, serving) = horma_master::start(listener, config, shutdown.clone());
         let mut serving = std::pin::pin!(serving);
@@ -41,17 +45,20 @@ pub(crate) fn master(args: &Master) -> Result<()> {
 
 /// Serves as a worker until it is told to stop, or until its master has gone.
 pub(crate) fn worker(args: Worker) -> Result<()> {
+    let tls = tls::load_as(&args.tls, Role::Worker)?;
+    let trusted = tls.is_some() || args.insecure;
     let config = horma_worker::Config {
         master: args.master,
         id: args.id.unwrap_or_else(system::process_name),
         incarnation: system::incarnation(),
         advertise: args.advertise,
+        tls,
         threads: args.threads.map_or_else(system::cores, usize::from),
         simd: args.simd.unwrap_or_else(Simd::best),
         patience: Duration::from_secs(args.patience),
     };
     serve(async {
-        let listener = listen(&args.bind, args.insecure).await?;
+        let listener = listen(&args.bind, trusted).await?;
         let shutdown = CancellationToken::new();
         let stopping = shutdown.clone();
         tokio::spawn(async move {
@@ -70,14 +77,15 @@ fn serve(server: impl Future<Output = Result<()>>) -> Result<()> {
     served
 }
 
-/// Listens, and prints where: with port 0 nobody could know otherwise.
-async fn listen(address: &str, insecure: bool) -> Result<TcpListener> {
+/// Listens, and prints where: with port 0 nobody could know otherwise. Beyond this machine only if
+/// what comes from there can be trusted.
+async fn listen(address: &str, trusted: bool) -> Result<TcpListener> {
     let listener = bind(address).await?;
     let bound = listener.local_addr().map_err(|source| Error::Bind {
         address: address.to_owned(),
         source,
     })?;
-    if !bound.ip().is_loopback() && !insecure {
+    if !bound.ip().is_loopback() && !trusted {
         return Err(Error::Exposed {
             address: bound.to_string(),
         });

@@ -1,47 +1,31 @@
 //! A run on a master elsewhere: the part goes out, the path comes back.
 
-use std::time::Duration;
-
 use horma_core::{Job, Part, Record, Trajectory, stitch};
 use horma_master::{Outcome, Progress};
+use horma_proto::transport::{self, Trouble, WANTS_TLS};
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::submit_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
 use horma_proto::wire::{SubmitHeader, SubmitRequest};
-use horma_proto::{Chunks, MAX_MESSAGE, VERSION};
-use tonic::transport::Endpoint;
-use tonic::{Code, Status};
+use horma_proto::{Answer, Chunks, MAX_MESSAGE, Role, Tls, VERSION};
+use tonic::Status;
 
 use crate::error::{Error, Result};
-
-/// Longest time to connect.
-const CONNECT: Duration = Duration::from_secs(5);
-
-/// How often the connection is tried while the master is silent, and how long that may take.
-const KEEPALIVE: Duration = Duration::from_secs(10);
 
 /// Has a part digitized by the master at `address`.
 pub(crate) async fn run(
     part: Part,
     job: Job,
     address: &str,
+    tls: Option<&Tls>,
     progress: Progress,
 ) -> Result<Outcome> {
     let bad_address = |_| Error::Address {
         address: address.to_owned(),
     };
-    let endpoint = Endpoint::from_shared(format!("http://{address}")).map_err(bad_address)?;
-    let channel = endpoint
-        .connect_timeout(CONNECT)
-        .http2_keep_alive_interval(KEEPALIVE)
-        .keep_alive_timeout(KEEPALIVE)
-        .tcp_nodelay(true)
-        .connect()
-        .await
-        .map_err(|e| Error::NoMaster {
-            address: address.to_owned(),
-            reason: cause(&e),
-        })?;
+    let endpoint = transport::endpoint(address).map_err(bad_address)?;
+    let connected = transport::connect(&endpoint, Role::Master, tls).await;
+    let channel = connected.map_err(|e| silence(address, &e))?;
     let mut client = MasterClient::new(channel)
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
@@ -49,7 +33,10 @@ pub(crate) async fn run(
     progress("send", 0, 0);
     let failed = |status: Status| refusal(address, &status);
     let replies = client.submit(tokio_stream::iter(requests(part, job)));
-    let mut replies = replies.await.map_err(failed)?.into_inner();
+    let mut replies = replies
+        .await
+        .map_err(|s| wants_tls(failed(s), tls))?
+        .into_inner();
     let bad = |reason: String| Error::BadReply {
         address: address.to_owned(),
         reason,
@@ -102,20 +89,46 @@ fn phase(name: &str) -> &'static str {
 
 /// What the master's status means for the user.
 fn refusal(address: &str, status: &Status) -> Error {
-    let (address, reason) = (address.to_owned(), status.message().to_owned());
-    match status.code() {
-        Code::InvalidArgument | Code::OutOfRange => Error::Refused { address, reason },
-        Code::ResourceExhausted => Error::Impossible { address, reason },
-        Code::Aborted | Code::FailedPrecondition => Error::JobFailed { address, reason },
-        _ => Error::NoMaster {
-            address,
-            reason: cause(status),
+    let (to, reason) = (address.to_owned(), status.message().to_owned());
+    match Answer::of(status) {
+        Answer::Wrong => Error::Refused {
+            address: to,
+            reason,
         },
+        Answer::Impossible => Error::Impossible {
+            address: to,
+            reason,
+        },
+        Answer::Failed => Error::JobFailed {
+            address: to,
+            reason,
+        },
+        Answer::Forbidden => Error::Untrusted {
+            address: to,
+            reason,
+        },
+        Answer::Stranger | Answer::Silence => silence(address, status),
     }
 }
 
-/// An error's innermost cause.
-fn cause(error: &(dyn std::error::Error + 'static)) -> String {
-    let causes = std::iter::successors(Some(error), |e| e.source());
-    causes.last().map_or_else(String::new, ToString::to_string)
+/// A plain connection that gave no first answer may have been made to a port with TLS.
+fn wants_tls(error: Error, tls: Option<&Tls>) -> Error {
+    match error {
+        Error::NoMaster { address, reason } if tls.is_none() => Error::NoMaster {
+            address,
+            reason: format!("{reason}; {WANTS_TLS}"),
+        },
+        other => other,
+    }
+}
+
+/// What it means that there is no answer.
+fn silence(address: &str, error: &(dyn std::error::Error + 'static)) -> Error {
+    let address = address.to_owned();
+    match Trouble::of(error, Role::Master) {
+        Trouble::Untrusted(reason) => Error::Untrusted { address, reason },
+        Trouble::Unreachable(reason) | Trouble::Broken(reason) => {
+            Error::NoMaster { address, reason }
+        }
+    }
 }

@@ -7,7 +7,7 @@
 //! they need to be safe, not the same everywhere, so they make do with single precision and
 //! a slack for it.
 
-use fearless_simd::{Simd, f32x8, prelude::*};
+use fearless_simd::{Simd, f32x8, mask32x8, prelude::*};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::contact::Pose;
@@ -321,54 +321,165 @@ pub(crate) fn lid_bounds<S: Simd>(
     place: [f32; 2],
     lids: &Lids,
 ) -> f32x8<S> {
-    let middle = load(simd, &lids.middle);
-    let u = load(simd, &lids.u);
-    let vy = f32x8::from_slice(simd, &lids.v[0]);
-    let vz = f32x8::from_slice(simd, &lids.v[1]);
-    let normal = load(simd, &lids.normal);
-    let above = f32x8::from_slice(simd, &lids.above);
-    let below = f32x8::from_slice(simd, &lids.below);
-    let along = f32x8::from_slice(simd, &lids.along);
-    let radius = f32x8::from_slice(simd, &lids.radius);
+    let under = Under::new(simd, cutter, view, place, lids);
+    let z = under.middle[2];
+    let circle = under.circle(under.radius);
+    let near = under.near(under.radius, z, 0.0);
+    near.select(
+        under.tangent.min(circle),
+        f32x8::splat(simd, f32::NEG_INFINITY),
+    )
+}
 
-    let w = cutter.half_width() as f32;
-    let [d, y, z] = turn(middle, view.cos, view.sin, [-view.x, 0.0, 0.0]);
-    let around = radius + (cutter.max_radius() as f32 + view.rounding);
-    let near =
-        d.abs().simd_le(along + (w + view.rounding)) & z.abs().simd_le(around + view.rounding);
-    let circle = y + ((around - z) * (around + z)).max(0.0).sqrt() + view.rounding;
+/// How up to eight positions differ from the first of them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Swing {
+    /// Of the angle between them the sine, 1 less the cosine and the chord, and the travel, mm.
+    by: [[f32; 4]; LANES],
+    /// The longest chord and the longest travel.
+    most: [f32; 2],
+}
 
-    // The tangent plane where the box comes nearest to the highest touch: away from that touch F
-    // falls, and the plane with it.
-    let half_d = u[0].abs();
-    let half_z = (u[1] * view.sin + u[2] * view.cos).abs() + (vy * view.sin + vz * view.cos).abs();
-    let near_d = (d - half_d).max(place[0]).min(d + half_d);
-    let near_z = (z - half_z).max(place[1]).min(z + half_z);
-    let slopes = Slopes::at(simd, cutter, [near_d, y, near_z]);
-    // Turned back into the part's frame, the plane's slopes tell how far it rises under a lid.
-    let slope = [
-        slopes.by_d,
-        slopes.by_z * view.sin + view.cos,
-        slopes.by_z * view.cos - view.sin,
-    ];
-    let by_w = dot3(slope, normal);
-    let outward = by_w.max(0.0);
-    let along_u = rise(
-        simd,
-        dot3(slope, u).abs(),
-        outward * f32x8::from_slice(simd, &lids.a),
-    );
-    let by_v = (slope[1] * vy + slope[2] * vz).abs();
-    let along_v = rise(simd, by_v, outward * f32x8::from_slice(simd, &lids.b));
-    let over = along_u + along_v + (by_w * above).max(-by_w * below);
-    let away_d = slopes.by_d * (d - slopes.d);
-    let away_z = slopes.by_z * (z - slopes.z);
-    let tangent = y + slopes.rise + away_d + away_z + over;
-    let lost = slopes.steep() * view.rounding
-        + (away_d.abs() + away_z.abs() + over.abs()) * (8.0 * f32::EPSILON);
+impl Swing {
+    /// Of these poses.
+    #[inline(always)]
+    pub fn new(poses: impl Iterator<Item = Pose> + Clone) -> Self {
+        let mut swing = Self {
+            by: [[0.0; 4]; LANES],
+            most: [0.0; 2],
+        };
+        let Some(from) = poses.clone().next() else {
+            return swing;
+        };
+        for (by, to) in swing.by.iter_mut().zip(poses) {
+            let sin = to.sin * from.cos - to.cos * from.sin;
+            let (c, s) = (to.cos - from.cos, to.sin - from.sin);
+            let square = c * c + s * s;
+            let travel = to.x - from.x;
+            *by = [sin, 0.5 * square, square.sqrt(), travel].map(|n| n as f32);
+            swing.most = [swing.most[0].max(by[2]), swing.most[1].max(by[3].abs())];
+        }
+        swing
+    }
+}
 
-    let bound = (tangent + lost).min(circle);
-    near.select(bound, f32x8::splat(simd, f32::NEG_INFINITY))
+/// Upper bounds of F under lids for each of several positions, from what the first of them sees: its
+/// tangent planes are as good for the others, to which the lids are turned.
+#[inline(always)]
+pub(crate) fn swung_lid_bounds<S: Simd>(
+    simd: S,
+    cutter: &Cutter,
+    view: &View,
+    swing: &Swing,
+    place: [f32; 2],
+    lids: &Lids,
+) -> [f32x8<S>; LANES] {
+    let under = Under::new(simd, cutter, view, place, lids);
+    let [_, y, z] = under.middle;
+    let [chord, travel] = swing.most;
+    let radius = under.radius + (y.abs() + z.abs()) * chord;
+    let circle = under.circle(radius);
+    let near = under.near(radius, z, travel);
+    let Slopes { by_d, by_z, .. } = under.slopes;
+    // Turned by δ, a middle rises over its plane by sin δ·forth − (1 − cos δ)·back, and whatever is about
+    // it by a chord of δ times its radius more, at most.
+    let forth = by_z * y - z;
+    let back = by_z * z + y;
+    let about = (by_z.abs() + 1.0) * under.radius;
+    let nothing = f32x8::splat(simd, f32::NEG_INFINITY);
+    let mut bounds = [nothing; LANES];
+    for (bound, by) in bounds.iter_mut().zip(&swing.by) {
+        let &[sin, versine, chord, travel] = by;
+        let tangent =
+            under.tangent + (forth * sin - back * versine - by_d * travel + about * chord);
+        // As much again is for the rounding of these few.
+        *bound = near.select((tangent + under.lost).min(circle), nothing);
+    }
+    bounds
+}
+
+/// Lids as one position sees them.
+struct Under<'a, S: Simd> {
+    cutter: &'a Cutter,
+    rounding: f32,
+    middle: Eight<S>,
+    along: f32x8<S>,
+    radius: f32x8<S>,
+    slopes: Slopes<S>,
+    /// How high the tangent plane is over them, at most.
+    tangent: f32x8<S>,
+    /// Of which this much is for rounding.
+    lost: f32x8<S>,
+}
+
+impl<'a, S: Simd> Under<'a, S> {
+    #[inline(always)]
+    fn new(simd: S, cutter: &'a Cutter, view: &View, place: [f32; 2], lids: &Lids) -> Self {
+        let middle = load(simd, &lids.middle);
+        let u = load(simd, &lids.u);
+        let vy = f32x8::from_slice(simd, &lids.v[0]);
+        let vz = f32x8::from_slice(simd, &lids.v[1]);
+        let normal = load(simd, &lids.normal);
+        let above = f32x8::from_slice(simd, &lids.above);
+        let below = f32x8::from_slice(simd, &lids.below);
+        let [d, y, z] = turn(middle, view.cos, view.sin, [-view.x, 0.0, 0.0]);
+        // The tangent plane where the box comes nearest to the highest touch: away from that touch F
+        // falls, and the plane with it.
+        let half_d = u[0].abs();
+        let half_z =
+            (u[1] * view.sin + u[2] * view.cos).abs() + (vy * view.sin + vz * view.cos).abs();
+        let near_d = (d - half_d).max(place[0]).min(d + half_d);
+        let near_z = (z - half_z).max(place[1]).min(z + half_z);
+        let slopes = Slopes::at(simd, cutter, [near_d, y, near_z]);
+        // Turned back into the part's frame, the plane's slopes tell how far it rises under a lid.
+        let slope = [
+            slopes.by_d,
+            slopes.by_z * view.sin + view.cos,
+            slopes.by_z * view.cos - view.sin,
+        ];
+        let by_w = dot3(slope, normal);
+        let outward = by_w.max(0.0);
+        let along_u = rise(
+            simd,
+            dot3(slope, u).abs(),
+            outward * f32x8::from_slice(simd, &lids.a),
+        );
+        let by_v = (slope[1] * vy + slope[2] * vz).abs();
+        let along_v = rise(simd, by_v, outward * f32x8::from_slice(simd, &lids.b));
+        let over = along_u + along_v + (by_w * above).max(-by_w * below);
+        let away_d = slopes.by_d * (d - slopes.d);
+        let away_z = slopes.by_z * (z - slopes.z);
+        let tangent = y + slopes.rise + away_d + away_z + over;
+        let lost = slopes.steep() * view.rounding
+            + (away_d.abs() + away_z.abs() + over.abs()) * (8.0 * f32::EPSILON);
+        Self {
+            cutter,
+            rounding: view.rounding,
+            middle: [d, y, z],
+            along: f32x8::from_slice(simd, &lids.along),
+            radius: f32x8::from_slice(simd, &lids.radius),
+            slopes,
+            tangent: tangent + lost,
+            lost,
+        }
+    }
+
+    /// Whether the cutter may reach what is within a radius about the middles, seen along the spindle,
+    /// from up to `travel` away.
+    #[inline(always)]
+    fn near(&self, radius: f32x8<S>, z: f32x8<S>, travel: f32) -> mask32x8<S> {
+        let w = self.cutter.half_width() as f32 + self.rounding + travel;
+        let around = radius + (self.cutter.max_radius() as f32 + 2.0 * self.rounding);
+        self.middle[0].abs().simd_le(self.along + w) & z.abs().simd_le(around)
+    }
+
+    /// How high the cutter's largest circle is over what is within a radius about the middles.
+    #[inline(always)]
+    fn circle(&self, radius: f32x8<S>) -> f32x8<S> {
+        let [_, y, z] = self.middle;
+        let around = radius + (self.cutter.max_radius() as f32 + self.rounding);
+        y + ((around - z) * (around + z)).max(0.0).sqrt() + self.rounding
+    }
 }
 
 /// The most of `by·s − bend·s²` for s in [0, 1].
@@ -623,6 +734,23 @@ mod tests {
     }
 
     #[inline(always)]
+    fn swung<S: Simd>(
+        simd: S,
+        cutter: &Cutter,
+        view: &View,
+        swing: &Swing,
+        place: [f32; 2],
+        lids: &Lids,
+    ) -> [[f32; 8]; LANES] {
+        let mut bounds = [[0.0; 8]; LANES];
+        let all = swung_lid_bounds(simd, cutter, view, swing, place, lids);
+        for (one, all) in bounds.iter_mut().zip(all) {
+            *one = *all;
+        }
+        bounds
+    }
+
+    #[inline(always)]
     fn facets<S: Simd>(
         simd: S,
         cutter: &Cutter,
@@ -711,6 +839,48 @@ mod tests {
                     }
                 }
                 prop_assert_eq!(bounds[2], f32::NEG_INFINITY, "nothing is there");
+            }
+        }
+
+        #[test]
+        fn nothing_under_a_lid_is_touched_above_its_bound_from_positions_nearby(
+            points in prop::collection::vec(prop::array::uniform3(-30.0..30.0_f64), 1..20),
+            far in prop_oneof![Just(0.0), Just(1.0e3), Just(1.0e5)],
+            x in -40.0..40.0_f64,
+            degrees in 0..360_i32,
+            by in prop_oneof![Just(0.0), Just(0.1), Just(1.0), Just(25.0)],
+            step in prop_oneof![Just(0.0), Just(0.005), Just(2.0)],
+            which in 0..4_usize,
+            shrink in prop_oneof![Just(1.0), Just(0.1), Just(0.001), Just(0.0)],
+            place in prop::array::uniform2(-20.0..20.0_f32),
+        ) {
+            let cutter = cutter(which);
+            let poses: [Pose; LANES] = std::array::from_fn(|k| {
+                let angle = (f64::from(degrees) + by * k as f64).to_radians();
+                let x = x + far + step * k as f64;
+                Pose { x, cos: libm::cos(angle), sin: libm::sin(angle) }
+            });
+            let points: Vec<Point> = points
+                .iter()
+                .map(|p| add_scaled(points[0], shrink, sub(*p, points[0])))
+                .map(|p| [p[0] + far, p[1], p[2]])
+                .collect();
+            let across = points.iter().map(|p| p[1].hypot(p[2])).fold(0.0, f64::max);
+            let frame = Frame::new(Interval::of(points.iter().map(|p| p[0])), across);
+            let mut held = Lids::EMPTY;
+            held.set(3, &frame, &points);
+            let view = View::new(&frame, &cutter, &poses[0]);
+            let swing = Swing::new(poses.into_iter());
+            for level in Level::available() {
+                let bounds = with_simd!(level, simd => swung(simd, &cutter, &view, &swing, place, &held));
+                for (pose, bounds) in poses.iter().zip(bounds) {
+                    for &p in &points {
+                        if let Some(touch) = touch_point(&cutter, pose, p) {
+                            prop_assert!(f64::from(bounds[3]) >= touch.height, "{level}");
+                        }
+                    }
+                    prop_assert_eq!(bounds[2], f32::NEG_INFINITY, "nothing is there");
+                }
             }
         }
 

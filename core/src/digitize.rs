@@ -14,6 +14,7 @@ use crate::blocks::{facet_blocks, facet_leaf, point_blocks, point_leaf};
 use crate::contact::{Pose, least_height};
 use crate::cutter::Cutter;
 use crate::job::{Contact, Job, Local, Method, Window};
+use crate::lanes::LANES;
 use crate::leaf::{FacetLeaf, Leaf, PointLeaf};
 use crate::local::{self, Grids};
 use crate::motion::{Motion, Trajectory};
@@ -336,24 +337,31 @@ fn exact<S: Vectors, L: Leaf>(
 ) -> (Vec<Option<Touch>>, Counters) {
     let mut counters = Counters::default();
     let mut touches: Vec<Option<Touch>> = Vec::with_capacity(poses.size_hint().0);
+    let mut poses = poses.peekable();
     let mut place = [0.0; 2];
-    for (i, pose) in poses.enumerate() {
-        let mut floor = f64::NEG_INFINITY;
-        for back in [1, revolution] {
-            let earlier = i.checked_sub(back).and_then(|i| touches[i]);
-            if let Some(touch) = earlier {
-                floor = floor.max(least_height(cutter, &pose, touch.contact));
+    let mut starts = Vec::with_capacity(LANES);
+    while poses.peek().is_some() {
+        let next = touches.len();
+        let touched = |i: Option<usize>| i.and_then(|i| touches.get(i).copied().flatten());
+        starts.clear();
+        for (i, pose) in (next..next + LANES).zip(poses.by_ref()) {
+            let mut floor = f64::NEG_INFINITY;
+            for earlier in [next.checked_sub(1), i.checked_sub(revolution)] {
+                if let Some(touch) = touched(earlier) {
+                    floor = floor.max(least_height(cutter, &pose, touch.contact));
+                }
             }
+            starts.push(Start { pose, floor, place });
         }
-        let start = Start { floor, place };
-        let touch = tree
-            .search(simd, cutter, &pose, &start, &mut counters)
-            .touch();
-        if let Some(touch) = touch {
-            let [d, _, z] = pose.face(touch.contact);
-            place = [d, z];
+        let found = tree.search(simd, cutter, &starts, &mut counters);
+        for (start, best) in starts.iter().zip(found) {
+            let touch = best.touch();
+            if let Some(touch) = touch {
+                let [d, _, z] = start.pose.face(touch.contact);
+                place = [d, z];
+            }
+            touches.push(touch);
         }
-        touches.push(touch);
     }
     (touches, counters)
 }
@@ -369,20 +377,20 @@ fn near<S: Vectors, L: Leaf>(
     let mut counters = Counters::default();
     let mut touches: Vec<Option<Touch>> = Vec::with_capacity(probes.len());
     let mut place = [0.0; 2];
-    for Probe { pose, near } in probes {
-        let mut floor = f64::NEG_INFINITY;
-        for touch in near.iter().flatten() {
-            floor = floor.max(least_height(cutter, pose, touch.contact));
+    let mut starts = Vec::with_capacity(LANES);
+    for eight in probes.chunks(LANES) {
+        starts.clear();
+        for &Probe { pose, near } in eight {
+            let mut floor = f64::NEG_INFINITY;
+            for touch in near.iter().flatten() {
+                floor = floor.max(least_height(cutter, &pose, touch.contact));
+                let [d, _, z] = pose.face(touch.contact);
+                place = [d, z];
+            }
+            starts.push(Start { pose, floor, place });
         }
-        let start = Start { floor, place };
-        let touch = tree
-            .search(simd, cutter, pose, &start, &mut counters)
-            .touch();
-        if let Some(touch) = touch {
-            let [d, _, z] = pose.face(touch.contact);
-            place = [d, z];
-        }
-        touches.push(touch);
+        let found = tree.search(simd, cutter, &starts, &mut counters);
+        touches.extend(found.iter().take(eight.len()).map(|best| best.touch()));
     }
     (touches, counters)
 }

@@ -62,7 +62,7 @@ impl Best {
 /// A few candidates.
 pub(crate) trait Leaf: Sync + Send {
     /// What rules candidates out before they are evaluated.
-    type Ceiling;
+    type Ceiling: Copy;
 
     /// The ceiling that touches F at a place on the cutter, `(d, z)`.
     fn ceiling(cutter: &Cutter, pose: &Pose, place: [f64; 2]) -> Self::Ceiling;

@@ -160,10 +160,11 @@ pub(crate) fn run<S: Simd>(
         }
         // Looked for from the winner's own height on: an equal one may come first in number.
         let start = Start {
+            pose,
             floor: best.height,
             place,
         };
-        let exact = tree.search(simd, cutter, &pose, &start, &mut counters);
+        let [exact, ..] = tree.search(simd, cutter, &[start], &mut counters);
         if exact.height > best.height {
             // Where the windows found nothing there is nothing to be too low.
             let found = best.id != Best::NOBODY;

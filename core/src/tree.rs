@@ -10,7 +10,7 @@ use fearless_simd::{Simd, f32x8, prelude::*};
 use rayon::prelude::*;
 
 use crate::blocks::{Block, longest_side};
-use crate::bound::{Frame, Lids, View, lid_bounds};
+use crate::bound::{Frame, Lids, Swing, View, lid_bounds, swung_lid_bounds};
 use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::LANES;
@@ -79,70 +79,132 @@ impl<L: Leaf> Tree<L> {
         size_of_val(&self.nodes[..]) + size_of_val(&self.leaves[..]) + size_of_val(&self.points[..])
     }
 
-    /// The highest of all candidates. `start` tells where to look first; it does not change the result.
+    /// The highest of all candidates for each of up to eight positions, which go through the hierarchy
+    /// together: where they are close to each other, most of the way is the same for all. `starts` tells
+    /// where to look first; it does not change the result.
     #[inline(always)]
     pub fn search<S: Simd>(
         &self,
         simd: S,
         cutter: &Cutter,
-        pose: &Pose,
-        start: &Start,
+        starts: &[Start],
         counters: &mut Counters,
-    ) -> Best {
-        let mut best = Best::above(start.floor);
-        loop {
-            self.raise(simd, cutter, pose, start.place, &mut best, counters);
-            if best.id != Best::NOBODY || best.height == f64::NEG_INFINITY {
-                break;
+    ) -> [Best; LANES] {
+        let mut best = [Best::above(f64::NEG_INFINITY); LANES];
+        let mut active = 0;
+        for (lane, start) in starts.iter().enumerate() {
+            best[lane].height = start.floor;
+            active |= 1 << lane;
+        }
+        while active != 0 {
+            self.raise(simd, cutter, starts, active, &mut best, counters);
+            active = 0;
+            for (lane, best) in best.iter_mut().enumerate() {
+                if best.id == Best::NOBODY && best.height > f64::NEG_INFINITY {
+                    // Rounding has put the floor above everything.
+                    best.height = f64::NEG_INFINITY;
+                    active |= 1 << lane;
+                }
             }
-            // Rounding has put the floor above everything.
-            best.height = f64::NEG_INFINITY;
         }
         best
     }
 
-    /// Raises `best` to the highest of all candidates.
+    /// Raises the `best` of each active position to the highest of all candidates.
     #[inline(always)]
     fn raise<S: Simd>(
         &self,
         simd: S,
         cutter: &Cutter,
-        pose: &Pose,
-        place: [f64; 2],
-        best: &mut Best,
+        starts: &[Start],
+        active: Lanes,
+        best: &mut [Best; LANES],
         counters: &mut Counters,
     ) {
-        if self.nodes.is_empty() {
+        let Some(first) = starts.first().filter(|_| !self.nodes.is_empty()) else {
             return;
+        };
+        let mut views = [View::new(&self.frame, cutter, &first.pose); LANES];
+        let mut tops = [Top::new::<L>(cutter, first, 0.0); LANES];
+        let mut heights = [f32::INFINITY; LANES];
+        for lane in lanes(active) {
+            let start = &starts[lane];
+            views[lane] = View::new(&self.frame, cutter, &start.pose);
+            tops[lane] = Top::new::<L>(cutter, start, best[lane].height);
+            heights[lane] = tops[lane].height;
         }
-        let view = View::new(&self.frame, cutter, pose);
-        let mut top = Top::<L>::new(cutter, pose, place, best.height);
+        let swing = Swing::new(starts.iter().map(|start| start.pose));
         let mut open = Stack::new();
-        open.push(f32::INFINITY, INNER);
+        open.push([f32::INFINITY; LANES], INNER);
         // Equal heights are still looked at: a lower number may be among them.
-        while let Some(child) = open.pop(top.height) {
+        while let Some((child, alive)) = open.pop(simd, &heights) {
+            let alive = alive & active;
             if child & INNER == 0 {
-                let before = (best.height, best.id);
                 let leaf = &self.leaves[child as usize];
-                counters.evaluations +=
-                    leaf.search(simd, &self.points, cutter, pose, &top.ceiling, best);
-                if before != (best.height, best.id) {
-                    let [d, _, z] = pose.face(best.contact);
-                    top = Top::new(cutter, pose, [d, z], best.height);
+                for lane in lanes(alive) {
+                    let (start, best) = (&starts[lane], &mut best[lane]);
+                    let before = (best.height, best.id);
+                    let (pose, ceiling) = (&start.pose, &tops[lane].ceiling);
+                    counters.evaluations +=
+                        leaf.search(simd, &self.points, cutter, pose, ceiling, best);
+                    if before != (best.height, best.id) {
+                        let [d, _, z] = pose.face(best.contact);
+                        let place = [d, z];
+                        let start = Start { place, ..*start };
+                        tops[lane] = Top::new::<L>(cutter, &start, best.height);
+                        heights[lane] = tops[lane].height;
+                    }
                 }
                 continue;
             }
-            counters.nodes += 1;
             let node = &self.nodes[(child ^ INNER) as usize];
-            let bounds = lid_bounds(simd, cutter, &view, top.place, &node.lids);
-            open.push_all(simd, bounds, top.height, &node.children);
+            let mut bounds = [[f32::NEG_INFINITY; LANES]; LANES];
+            let mut high = 0;
+            let over_nodes = node.children[0] & INNER != 0;
+            if over_nodes && alive.count_ones() > 1 {
+                // What one position's view loses for the others is little beside a large lid's slack.
+                counters.nodes += 1;
+                let (view, place) = (&views[0], tops[0].place);
+                let all = swung_lid_bounds(simd, cutter, view, &swing, place, &node.lids);
+                for lane in lanes(alive) {
+                    high |= all[lane].simd_ge(heights[lane]).to_bitmask();
+                    bounds[lane] = *all[lane];
+                }
+            } else {
+                counters.nodes += u64::from(alive.count_ones());
+                for lane in lanes(alive) {
+                    let (view, place) = (&views[lane], tops[lane].place);
+                    let all = lid_bounds(simd, cutter, view, place, &node.lids);
+                    high |= all.simd_ge(heights[lane]).to_bitmask();
+                    bounds[lane] = *all;
+                }
+            }
+            open.push_all(simd, &bounds, high, &heights, &node.children);
         }
     }
+}
+
+/// Some of eight positions.
+type Lanes = u64;
+
+/// Their numbers.
+#[inline(always)]
+fn lanes(mut some: Lanes) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(
+        #[inline(always)]
+        move || {
+            let lane = (some != 0).then(|| some.trailing_zeros() as usize);
+            some &= some.wrapping_sub(1);
+            lane
+        },
+    )
 }
 
 /// What is known before a search.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Start {
+    /// Where part and cutter stand.
+    pub pose: Pose,
     /// A height that some candidate exceeds, mm, or minus infinity.
     pub floor: f64,
     /// `(d, z)` of the place on the cutter that is likely to touch.
@@ -150,29 +212,31 @@ pub(crate) struct Start {
 }
 
 /// What the best candidate so far rules out.
-struct Top<L: Leaf> {
+#[derive(Debug, Clone, Copy)]
+struct Top<C> {
     /// Not above its height, and never below everything.
     height: f32,
     /// `(d, z)` of its place on the cutter, and what leaves make of it.
     place: [f32; 2],
-    ceiling: L::Ceiling,
+    ceiling: C,
 }
 
-impl<L: Leaf> Top<L> {
+impl<C> Top<C> {
+    /// Of a candidate of this height that is touched at the place that `start` names.
     #[inline(always)]
-    fn new(cutter: &Cutter, pose: &Pose, place: [f64; 2], height: f64) -> Self {
+    fn new<L: Leaf<Ceiling = C>>(cutter: &Cutter, start: &Start, height: f64) -> Self {
         let low = height as f32 - height.abs() as f32 * f32::EPSILON;
         Self {
             height: low.max(f32::MIN),
-            place: [place[0] as f32, place[1] as f32],
-            ceiling: L::ceiling(cutter, pose, place),
+            place: [start.place[0] as f32, start.place[1] as f32],
+            ceiling: L::ceiling(cutter, &start.pose, start.place),
         }
     }
 }
 
-/// The children still to be looked at.
+/// The children still to be looked at, each with its bound for every position.
 struct Stack {
-    open: [(f32, u32); Self::SIZE],
+    open: [([f32; LANES], u32); Self::SIZE],
     len: usize,
 }
 
@@ -183,44 +247,63 @@ impl Stack {
     #[inline(always)]
     fn new() -> Self {
         Self {
-            open: [(0.0, 0); Self::SIZE],
+            open: [([0.0; LANES], 0); Self::SIZE],
             len: 0,
         }
     }
 
     #[inline(always)]
-    fn push(&mut self, bound: f32, child: u32) {
-        self.open[self.len] = (bound, child);
+    fn push(&mut self, bounds: [f32; LANES], child: u32) {
+        self.open[self.len] = (bounds, child);
         self.len += 1;
     }
 
-    /// Pushes the children whose bound is not below `height`, the most promising one last.
+    /// Pushes the children in `high`, the most promising one last.
     #[inline(always)]
-    fn push_all<S: Simd>(&mut self, _: S, bounds: f32x8<S>, height: f32, children: &[u32; LANES]) {
-        let mut high = bounds.simd_ge(height).to_bitmask();
-        let first = self.len;
-        let mut highest = first;
+    fn push_all<S: Simd>(
+        &mut self,
+        simd: S,
+        bounds: &[[f32; LANES]; LANES],
+        mut high: u64,
+        heights: &[f32; LANES],
+        children: &[u32; LANES],
+    ) {
+        let heights = f32x8::from_slice(simd, heights);
+        let (mut highest, mut promise) = (self.len, f32::NEG_INFINITY);
         while high != 0 {
-            let lane = high.trailing_zeros() as usize;
+            let slot = high.trailing_zeros() as usize;
             high &= high - 1;
-            if self.len > first && bounds[lane] > self.open[highest].0 {
-                highest = self.len;
+            let mut own = [0.0; LANES];
+            for lane in 0..LANES {
+                own[lane] = bounds[lane][slot];
             }
-            self.push(bounds[lane], children[lane]);
+            let excess = (f32x8::from_slice(simd, &own) - heights).reduce_max();
+            if excess > promise {
+                (highest, promise) = (self.len, excess);
+            }
+            self.push(own, children[slot]);
         }
-        if self.len > first {
-            self.open.swap(highest, self.len - 1);
+        if let Some(last) = self
+            .len
+            .checked_sub(1)
+            .filter(|_| promise > f32::NEG_INFINITY)
+        {
+            self.open.swap(highest, last);
         }
     }
 
-    /// The next child whose bound is not below `height`.
+    /// The next child, and the positions for which its bound is not below their `heights`.
     #[inline(always)]
-    fn pop(&mut self, height: f32) -> Option<u32> {
+    fn pop<S: Simd>(&mut self, simd: S, heights: &[f32; LANES]) -> Option<(u32, Lanes)> {
+        let heights = f32x8::from_slice(simd, heights);
         while let Some(len) = self.len.checked_sub(1) {
             self.len = len;
-            let (bound, child) = self.open[len];
-            if bound >= height {
-                return Some(child);
+            let (bounds, child) = &self.open[len];
+            let alive = f32x8::from_slice(simd, bounds)
+                .simd_ge(heights)
+                .to_bitmask();
+            if alive != 0 {
+                return Some((*child, alive));
             }
         }
         None

@@ -2,28 +2,21 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use horma_core::{Extent, ExtentRecord, Inserted, Plan, SubTrajectory};
+use horma_proto::transport::{self, Trouble};
 use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::digitize_request::Kind as Request;
 use horma_proto::wire::worker_client::WorkerClient;
 use horma_proto::wire::{self, DigitizeReply, DigitizeRequest};
-use horma_proto::{Chunks, Error, MAX_MESSAGE, TaskId};
+use horma_proto::{Answer, Chunks, Error, MAX_MESSAGE, Role, TaskId, Tls};
 use prost::Message;
 use tokio::sync::oneshot;
-use tonic::transport::Endpoint;
-use tonic::{Code, Status, Streaming};
+use tonic::{Status, Streaming};
 
 use crate::Progress;
 use crate::state::Fault;
-
-/// Longest time to connect to a worker.
-const CONNECT: Duration = Duration::from_secs(5);
-
-/// How often an open connection is tried, and how long the answer may take: a host that is cut off
-/// sends no reset.
-const KEEPALIVE: Duration = Duration::from_secs(5);
 
 /// All that an attempt needs.
 pub(crate) struct Attempt {
@@ -38,6 +31,7 @@ pub(crate) struct Attempt {
     /// Those of them that were inserted, which `arrived` does not count.
     pub inserted: Arc<AtomicU64>,
     pub progress: Progress,
+    pub tls: Option<Tls>,
 }
 
 /// A task, delivered.
@@ -92,14 +86,10 @@ pub(crate) async fn dispatch(
 
 async fn call(attempt: &Attempt, received: &mut SubTrajectory) -> Result<ExtentRecord, Fault> {
     let begin = Instant::now();
-    let lost = |e: tonic::transport::Error| Fault::Lost(chain(&e));
-    let channel = Endpoint::from_shared(format!("http://{}", attempt.address))
-        .map_err(lost)?
-        .connect_timeout(CONNECT)
-        .http2_keep_alive_interval(KEEPALIVE)
-        .keep_alive_timeout(KEEPALIVE)
-        .tcp_nodelay(true)
-        .connect()
+    let tls = attempt.tls.as_ref();
+    let lost = |e: tonic::transport::Error| lost(&e);
+    let endpoint = transport::endpoint(&attempt.address).map_err(lost)?;
+    let channel = transport::connect(&endpoint, Role::Worker, tls)
         .await
         .map_err(lost)?;
     let mut client = WorkerClient::new(channel)
@@ -224,11 +214,20 @@ fn receive_inserted(
 /// What a status says of the worker. Only an answer about the content is the worker's fault; a
 /// partition may show as almost anything else.
 fn fault(status: &Status) -> Fault {
-    match status.code() {
-        Code::InvalidArgument | Code::OutOfRange | Code::DataLoss | Code::Unimplemented => {
-            Fault::Wrong(status.message().to_owned())
+    match Answer::of(status) {
+        Answer::Wrong => Fault::Wrong(status.message().to_owned()),
+        Answer::Silence => lost(status),
+        Answer::Impossible | Answer::Failed | Answer::Forbidden | Answer::Stranger => {
+            Fault::Lost(status.message().to_owned())
         }
-        _ => Fault::Lost(chain(status)),
+    }
+}
+
+/// The worker cannot be reached, or not be trusted to be one.
+fn lost(error: &(dyn std::error::Error + 'static)) -> Fault {
+    match Trouble::of(error, Role::Worker) {
+        Trouble::Untrusted(reason) => Fault::Lost(format!("it is not trusted: {reason}")),
+        Trouble::Unreachable(_) | Trouble::Broken(_) => Fault::Lost(chain(error)),
     }
 }
 

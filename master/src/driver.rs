@@ -66,7 +66,7 @@ impl Master {
         let (inbox, messages) = mpsc::channel(INBOX);
         let (count, workers) = watch::channel(0);
         let driver = Driver {
-            config,
+            config: config.clone(),
             begin: Instant::now(),
             state: State::new(config.lease, config.regroup),
             addresses: BTreeMap::new(),
@@ -419,6 +419,7 @@ impl Driver {
             arrived: job.arrived.clone(),
             inserted: job.inserted.clone(),
             progress: job.progress.clone(),
+            tls: self.config.tls.clone(),
         };
         info!(%task, worker, positions = attempt.extent.count, "started");
         let inbox = self.inbox.clone();

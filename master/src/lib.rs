@@ -17,20 +17,20 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use horma_core::{Job, Part, Plan, Record, ToolPath};
-use horma_proto::MAX_MESSAGE;
 use horma_proto::wire::master_server::MasterServer;
+use horma_proto::{Guard, MAX_MESSAGE, Tls, transport};
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
-use tonic::transport::Server;
-use tonic::transport::server::TcpIncoming;
 
 pub use driver::Master;
 pub use error::{Error, Result};
 
 /// What a master has to know.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Config {
+    /// What proves who is who; without it traffic is plain and anybody may call.
+    pub tls: Option<Tls>,
     /// How often a worker is to say that it is alive.
     pub heartbeat: Duration,
     /// After how long a silence a worker counts as lost.
@@ -61,21 +61,20 @@ pub fn start(
     config: Config,
     shutdown: CancellationToken,
 ) -> (Master, JoinHandle<Result<()>>) {
-    let master = Master::start(config, shutdown.clone());
-    let service = service::Service::new(master.clone(), config);
+    let tls = config.tls.clone();
+    let service = service::Service {
+        max_part: config.max_part,
+        heartbeat: config.heartbeat,
+        guard: Guard::of(tls.as_ref()),
+        master: Master::start(config, shutdown.clone()),
+    };
+    let master = service.master.clone();
     let service = MasterServer::new(service)
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
     let failed = |e| Error::Serve(Arc::new(e));
     let serving = tokio::spawn(async move {
-        let server = Server::builder()
-            .http2_keepalive_interval(Some(Duration::from_secs(5)))
-            .http2_keepalive_timeout(Some(Duration::from_secs(10)))
-            .add_service(service)
-            .serve_with_incoming_shutdown(
-                TcpIncoming::from(listener).with_nodelay(Some(true)),
-                shutdown.cancelled(),
-            );
+        let server = transport::serve(service, listener, tls.as_ref(), shutdown.cancelled());
         let mut server = std::pin::pin!(server);
         tokio::select! {
             served = &mut server => return served.map_err(failed),

@@ -11,14 +11,14 @@ use horma_proto::wire::{
     self, HeartbeatReply, HeartbeatRequest, RegisterReply, RegisterRequest, SubmitReply,
     SubmitRequest,
 };
-use horma_proto::{Error, Messages, VERSION};
+use horma_proto::{Error, Guard, Messages, Role, VERSION};
 use tokio::sync::{mpsc, oneshot};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request as Call, Response, Status, Streaming};
 use tracing::info;
 
 use crate::driver::{Master, Message};
-use crate::{Config, Outcome, Progress};
+use crate::{Outcome, Progress};
 
 /// Replies that may wait for a client.
 const WAITING_REPLIES: usize = 16;
@@ -27,15 +27,16 @@ const WAITING_REPLIES: usize = 16;
 const CLIENT_PATIENCE: Duration = Duration::from_secs(30);
 
 pub(crate) struct Service {
-    master: Master,
-    config: Config,
+    pub master: Master,
+    /// Who may call what.
+    pub guard: Guard,
+    /// How often a worker is to say that it is alive.
+    pub heartbeat: Duration,
+    /// Largest part that a client may send, bytes on the wire.
+    pub max_part: u64,
 }
 
 impl Service {
-    pub fn new(master: Master, config: Config) -> Self {
-        Self { master, config }
-    }
-
     async fn ask(
         &self,
         message: impl FnOnce(oneshot::Sender<bool>) -> Message,
@@ -57,6 +58,7 @@ impl Api for Service {
         &self,
         call: Call<RegisterRequest>,
     ) -> Result<Response<RegisterReply>, Status> {
+        self.guard.admit(&call, Role::Worker)?;
         let RegisterRequest {
             version,
             worker,
@@ -72,11 +74,10 @@ impl Api for Service {
             reply,
         };
         if !self.ask(register).await? {
-            let why = format!("worker {name} has answered wrongly before; restart it");
-            return Err(Status::permission_denied(why));
+            return Err(Error::Distrusted { worker: name }.into());
         }
         Ok(Response::new(RegisterReply {
-            heartbeat_ms: self.config.heartbeat.as_millis() as u32,
+            heartbeat_ms: self.heartbeat.as_millis() as u32,
         }))
     }
 
@@ -84,6 +85,7 @@ impl Api for Service {
         &self,
         call: Call<HeartbeatRequest>,
     ) -> Result<Response<HeartbeatReply>, Status> {
+        self.guard.admit(&call, Role::Worker)?;
         let HeartbeatRequest {
             worker,
             incarnation,
@@ -105,7 +107,8 @@ impl Api for Service {
         &self,
         call: Call<Streaming<SubmitRequest>>,
     ) -> Result<Response<Self::SubmitStream>, Status> {
-        let (part, job) = receive(call.into_inner(), self.config.max_part).await?;
+        self.guard.admit(&call, Role::Client)?;
+        let (part, job) = receive(call.into_inner(), self.max_part).await?;
         info!(bodies = part.bodies.len(), "submitted");
         let (replies, stream) = mpsc::channel(WAITING_REPLIES);
         let master = self.master.clone();
@@ -155,7 +158,7 @@ async fn receive(
         let next = tokio::time::timeout(CLIENT_PATIENCE, requests.message());
         let next = next.await.map_err(|_| {
             let seconds = CLIENT_PATIENCE.as_secs();
-            Status::deadline_exceeded(format!("the client sent nothing for {seconds} s"))
+            Error::TooSlow { seconds }
         })?;
         match (next?.map(|r| r.kind), &job) {
             (None, _) => break,

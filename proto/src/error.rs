@@ -2,6 +2,8 @@
 
 use tonic::{Code, Status};
 
+use crate::tls::Role;
+
 /// Everything that can be wrong with a message, and everything a service refuses.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -71,6 +73,29 @@ pub enum Error {
         /// Its name.
         worker: String,
     },
+    /// A caller without a certificate where one is demanded.
+    #[error("this call needs a certificate, and there is none")]
+    Unproven,
+    /// A caller with another role than the call is for.
+    #[error("this call is for a {role}, and the caller's certificate names {found}")]
+    Forbidden {
+        /// The role that it is for.
+        role: Role,
+        /// What the caller's certificate names, in words.
+        found: String,
+    },
+    /// A worker that is not believed any more.
+    #[error("worker {worker} has answered wrongly before; restart it")]
+    Distrusted {
+        /// Its name.
+        worker: String,
+    },
+    /// A caller that keeps an open call waiting.
+    #[error("nothing came for {seconds} s")]
+    TooSlow {
+        /// How long it was waited for.
+        seconds: u64,
+    },
     /// The job failed on the cluster.
     #[error("{0}")]
     JobFailed(String),
@@ -93,7 +118,10 @@ impl Error {
             }
             Self::Checksum { .. } | Self::Incomplete { .. } => Code::DataLoss,
             Self::TooLarge { .. } => Code::OutOfRange,
-            Self::Version { .. } => Code::FailedPrecondition,
+            Self::Version { .. } | Self::Distrusted { .. } => Code::FailedPrecondition,
+            Self::Unproven => Code::Unauthenticated,
+            Self::Forbidden { .. } => Code::PermissionDenied,
+            Self::TooSlow { .. } => Code::DeadlineExceeded,
             Self::UnknownWorker { .. } => Code::NotFound,
             Self::JobFailed(_) => Code::Aborted,
             Self::ShuttingDown(_) => Code::Unavailable,
@@ -104,5 +132,83 @@ impl Error {
 impl From<Error> for Status {
     fn from(error: Error) -> Self {
         Self::new(error.code(), error.to_string())
+    }
+}
+
+/// What a status says to the end that gets it: every code has one meaning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Answer {
+    /// What was sent cannot be right.
+    Wrong,
+    /// What was asked cannot be done.
+    Impossible,
+    /// It was tried and failed, or the two ends do not fit together.
+    Failed,
+    /// The one who asked may not.
+    Forbidden,
+    /// The one who asked is not known.
+    Stranger,
+    /// No answer at all: a partition may show as almost any code.
+    Silence,
+}
+
+impl Answer {
+    /// The meaning of this status.
+    pub fn of(status: &Status) -> Self {
+        match status.code() {
+            Code::InvalidArgument | Code::OutOfRange | Code::DataLoss | Code::Unimplemented => {
+                Self::Wrong
+            }
+            Code::ResourceExhausted => Self::Impossible,
+            Code::Aborted | Code::FailedPrecondition => Self::Failed,
+            Code::PermissionDenied | Code::Unauthenticated => Self::Forbidden,
+            Code::NotFound => Self::Stranger,
+            Code::Ok
+            | Code::Cancelled
+            | Code::Unknown
+            | Code::DeadlineExceeded
+            | Code::AlreadyExists
+            | Code::Internal
+            | Code::Unavailable => Self::Silence,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_means_the_same_at_both_ends() {
+        let worker = || "w".to_owned();
+        let cases = [
+            (Error::Malformed("x".to_owned()), Answer::Wrong),
+            (Error::TooLarge { bytes: 2, limit: 1 }, Answer::Wrong),
+            (
+                Error::Checksum {
+                    found: 1,
+                    expected: 2,
+                },
+                Answer::Wrong,
+            ),
+            (Error::JobFailed("x".to_owned()), Answer::Failed),
+            (Error::Distrusted { worker: worker() }, Answer::Failed),
+            (Error::Unproven, Answer::Forbidden),
+            (
+                Error::Forbidden {
+                    role: Role::Worker,
+                    found: "no role".to_owned(),
+                },
+                Answer::Forbidden,
+            ),
+            (Error::UnknownWorker { worker: worker() }, Answer::Stranger),
+            (Error::ShuttingDown("the master"), Answer::Silence),
+            (Error::TooSlow { seconds: 30 }, Answer::Silence),
+        ];
+        for (error, expected) in cases {
+            let status = Status::from(error.clone());
+            assert_eq!(Answer::of(&status), expected, "{error}");
+            assert_eq!(status.message(), error.to_string());
+        }
     }
 }

@@ -2,12 +2,18 @@
 //!
 //! `cluster.proto` is the contract; [`wire`] is what is generated from it, `convert` takes it to
 //! and from the core's valid types, `chunk` cuts what is large. Whatever arrives is checked here:
-//! past this crate a value is as valid as one made in this process. This crate opens no connection.
+//! past this crate a value is as valid as one made in this process. [`transport`] says how a connection
+//! is made and [`tls`] who may speak on it; this crate opens none of its own accord and reads no file.
 
 mod chunk;
 mod convert;
 mod error;
 mod task;
+
+mod accept;
+mod refused;
+pub mod tls;
+pub mod transport;
 
 /// The generated types and services. They stay at the edges: everything else uses the core's types.
 #[allow(missing_docs, unused_qualifications, clippy::all, clippy::pedantic)]
@@ -21,8 +27,9 @@ pub use chunk::{pack_positions, position_chunks, unpack_positions};
 pub use convert::{body_from_wire, body_to_wire, job_from_wire, job_to_wire};
 pub use convert::{counters_from_wire, counters_to_wire};
 pub use convert::{row_from_wire, row_to_wire, trajectory_from_wire, trajectory_to_wire};
-pub use error::{Error, Result};
+pub use error::{Answer, Error, Result};
 pub use task::TaskId;
+pub use tls::{Guard, Role, Tls};
 
 /// The version that both ends of a connection must share.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

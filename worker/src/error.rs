@@ -29,6 +29,14 @@ pub enum Error {
         /// Its words.
         reason: String,
     },
+    /// The master and this worker do not trust each other.
+    #[error("the master at {address} and this worker do not trust each other: {reason}")]
+    Untrusted {
+        /// Where it is.
+        address: String,
+        /// Who does not trust whom, and why.
+        reason: String,
+    },
     /// The listener is gone.
     #[error("the listening socket has no address: {0}")]
     Listener(std::io::Error),

@@ -11,12 +11,10 @@ use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::time::Duration;
 
 use horma_core::Simd;
-use horma_proto::MAX_MESSAGE;
 use horma_proto::wire::worker_server::WorkerServer;
+use horma_proto::{Guard, MAX_MESSAGE, Tls, transport};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
-use tonic::transport::Server;
-use tonic::transport::server::TcpIncoming;
 use tracing::info;
 
 pub use error::{Error, Result};
@@ -33,6 +31,8 @@ pub struct Config {
     /// `host:port` at which the master reaches this worker; by default the listener's port at the
     /// address that the way to the master leaves from.
     pub advertise: Option<String>,
+    /// What proves who is who; without it traffic is plain and anybody may call.
+    pub tls: Option<Tls>,
     /// Threads to digitize with.
     pub threads: usize,
     /// Instruction set to digitize with.
@@ -60,19 +60,16 @@ pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationTo
         .num_threads(config.threads)
         .build()
         .map_err(Error::Threads)?;
-    let service = service::Service::new(pool, config.simd, shutdown.clone());
+    let guard = Guard::of(config.tls.as_ref());
+    let service = service::Service::new(pool, config.simd, guard, shutdown.clone());
     let service = WorkerServer::new(service)
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
-    let serving = Server::builder()
-        .http2_keepalive_interval(Some(Duration::from_secs(5)))
-        .http2_keepalive_timeout(Some(Duration::from_secs(10)))
-        .add_service(service)
-        .serve_with_incoming_shutdown(
-            TcpIncoming::from(listener).with_nodelay(Some(true)),
-            shutdown.clone().cancelled_owned(),
+    let (tls, stopped) = (config.tls.clone(), shutdown.clone().cancelled_owned());
+    let serving =
+        tokio::spawn(
+            async move { transport::serve(service, listener, tls.as_ref(), stopped).await },
         );
-    let serving = tokio::spawn(serving);
     let outcome = membership::keep(&config, &address, &shutdown).await;
     // Membership is what a worker lives for: without it there is nobody to serve.
     shutdown.cancel();

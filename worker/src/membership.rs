@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
-use horma_proto::VERSION;
+use horma_proto::transport::{self, Trouble, WANTS_TLS};
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::{HeartbeatRequest, RegisterRequest};
+use horma_proto::{Answer, Role, VERSION};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
-use tonic::transport::{Channel, Endpoint};
-use tonic::{Code, Status};
+use tonic::Status;
+use tonic::transport::Channel;
 use tracing::{info, warn};
 
 use crate::Config;
@@ -29,7 +30,7 @@ pub(crate) async fn keep(
     shutdown: &CancellationToken,
 ) -> Result<()> {
     let member = async {
-        let mut client = connect(&config.master)?;
+        let mut client = connect(config)?;
         let mut heard: Option<Instant> = None;
         let begin = Instant::now();
         let mut pause = FIRST_PAUSE;
@@ -42,29 +43,32 @@ pub(crate) async fn keep(
                     heard = Some(Instant::now());
                     silence
                 }
-                Err(status) if is_final(&status) => {
-                    return Err(Error::Refused {
-                        address: config.master.clone(),
-                        reason: status.message().to_owned(),
-                    });
-                }
                 Err(status) => status,
             };
-            if silence.code() == Code::NotFound {
-                continue;
-            }
-            warn!(
-                master = config.master,
-                reason = silence.message(),
-                "no answer"
-            );
+            let reason = match Answer::of(&silence) {
+                Answer::Stranger => continue,
+                Answer::Silence => silent(config, &silence, heard.is_some())?,
+                Answer::Forbidden => {
+                    return Err(Error::Untrusted {
+                        address: config.master.clone(),
+                        reason: silence.message().to_owned(),
+                    });
+                }
+                Answer::Wrong | Answer::Impossible | Answer::Failed => {
+                    return Err(Error::Refused {
+                        address: config.master.clone(),
+                        reason: silence.message().to_owned(),
+                    });
+                }
+            };
+            warn!(master = config.master, reason, "no answer");
             if heard.unwrap_or(begin).elapsed() >= config.patience {
                 return match heard {
                     Some(_) => Ok(()),
                     None => Err(Error::NoMaster {
                         address: config.master.clone(),
                         waited: config.patience,
-                        reason: silence.message().to_owned(),
+                        reason,
                     }),
                 };
             }
@@ -78,17 +82,27 @@ pub(crate) async fn keep(
     }
 }
 
-fn connect(master: &str) -> Result<MasterClient<Channel>> {
-    let endpoint = Endpoint::from_shared(format!("http://{master}"));
-    let endpoint = endpoint.map_err(|_| Error::Address {
-        address: master.to_owned(),
+fn connect(config: &Config) -> Result<MasterClient<Channel>> {
+    let endpoint = transport::endpoint(&config.master).map_err(|_| Error::Address {
+        address: config.master.clone(),
     })?;
-    let channel = endpoint
-        .connect_timeout(DEADLINE)
-        .timeout(DEADLINE)
-        .tcp_nodelay(true)
-        .connect_lazy();
+    let endpoint = endpoint.timeout(DEADLINE);
+    let channel = transport::connect_lazily(&endpoint, Role::Master, config.tls.as_ref());
     Ok(MasterClient::new(channel))
+}
+
+/// Why the master says nothing; an error if it never will.
+fn silent(config: &Config, status: &Status, heard: bool) -> Result<String> {
+    match Trouble::of(status, Role::Master) {
+        Trouble::Broken(reason) if config.tls.is_none() && !heard => {
+            Ok(format!("{reason}; {WANTS_TLS}"))
+        }
+        Trouble::Broken(reason) | Trouble::Unreachable(reason) => Ok(reason),
+        Trouble::Untrusted(reason) => Err(Error::Untrusted {
+            address: config.master.clone(),
+            reason,
+        }),
+    }
 }
 
 /// Registers; returns how often the master wants to hear.
@@ -123,12 +137,4 @@ async fn heartbeats(
             return status;
         }
     }
-}
-
-/// Whether the master said no, rather than nothing.
-fn is_final(status: &Status) -> bool {
-    matches!(
-        status.code(),
-        Code::FailedPrecondition | Code::PermissionDenied | Code::InvalidArgument
-    )
 }

@@ -8,7 +8,7 @@ use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::digitize_request::Kind as Request;
 use horma_proto::wire::worker_server::Worker;
 use horma_proto::wire::{self, DigitizeReply, DigitizeRequest};
-use horma_proto::{Error, Messages, TaskId};
+use horma_proto::{Error, Guard, Messages, Role, TaskId};
 use rayon::ThreadPool;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
@@ -22,15 +22,17 @@ const WAITING_CHUNKS: usize = 4;
 pub(crate) struct Service {
     pool: Arc<ThreadPool>,
     simd: Simd,
+    guard: Guard,
     shutdown: CancellationToken,
 }
 
 impl Service {
-    pub fn new(pool: ThreadPool, simd: Simd, shutdown: CancellationToken) -> Self {
+    pub fn new(pool: ThreadPool, simd: Simd, guard: Guard, shutdown: CancellationToken) -> Self {
         let pool = Arc::new(pool);
         Self {
             pool,
             simd,
+            guard,
             shutdown,
         }
     }
@@ -44,6 +46,7 @@ impl Worker for Service {
         &self,
         request: tonic::Request<Streaming<DigitizeRequest>>,
     ) -> Result<Response<Self::DigitizeStream>, Status> {
+        self.guard.admit(&request, Role::Master)?;
         let task = receive(request.into_inner()).await?;
         info!(id = %task.id, first = task.first, count = task.count, rows = task.rows.len(), "task");
         let (replies, stream) = mpsc::channel(WAITING_CHUNKS);

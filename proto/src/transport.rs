@@ -1,0 +1,223 @@
+//! Connections, the same everywhere: how one is made, kept alive and given up, plain or with TLS, and
+//! what it means that one failed. Who connects to whom, and when, is decided elsewhere.
+
+use std::convert::Infallible;
+use std::io;
+use std::sync::Arc;
+use std::time::Duration;
+
+use hyper_util::rt::TokioIo;
+use tokio::io::AsyncBufReadExt;
+use tokio::net::{TcpListener, TcpStream};
+use tokio_rustls::TlsConnector;
+use tokio_rustls::client::TlsStream;
+use tokio_rustls::rustls::pki_types::ServerName;
+use tokio_rustls::rustls::{self, AlertDescription, CertificateError};
+use tonic::body::Body;
+use tonic::codegen::http::{Request, Response, Uri};
+use tonic::server::NamedService;
+use tonic::transport::server::TcpIncoming;
+use tonic::transport::{Channel, Endpoint, Server};
+use tower::Service;
+use tower::util::MapResponseLayer;
+
+use crate::accept;
+use crate::refused::Refused;
+use crate::tls::{Role, Tls};
+
+/// Longest time to connect.
+const CONNECT: Duration = Duration::from_secs(5);
+
+/// How often a connection with open calls is tried: a host that is cut off sends no reset.
+const KEEPALIVE: Duration = Duration::from_secs(5);
+
+/// How long the answer to such a try may take.
+const ANSWER: Duration = Duration::from_secs(10);
+
+/// The way to `address`, `host:port`.
+///
+/// # Errors
+/// The address cannot be one.
+pub fn endpoint(address: &str) -> Result<Endpoint, tonic::transport::Error> {
+    Ok(Endpoint::from_shared(format!("http://{address}"))?
+        .connect_timeout(CONNECT)
+        .http2_keep_alive_interval(KEEPALIVE)
+        .keep_alive_timeout(ANSWER)
+        .tcp_keepalive(Some(KEEPALIVE))
+        .tcp_nodelay(true))
+}
+
+/// Connects to a peer, who has to prove that role if there is TLS.
+///
+/// # Errors
+/// Nobody answers, or one end does not trust the other; [`Trouble`] tells which.
+pub async fn connect(
+    to: &Endpoint,
+    role: Role,
+    tls: Option<&Tls>,
+) -> Result<Channel, tonic::transport::Error> {
+    match tls {
+        None => to.connect().await,
+        Some(tls) => to.connect_with_connector(connector(to, role, tls)).await,
+    }
+}
+
+/// As [`connect`], at the first call, and again when the connection is lost.
+pub fn connect_lazily(to: &Endpoint, role: Role, tls: Option<&Tls>) -> Channel {
+    match tls {
+        None => to.connect_lazy(),
+        Some(tls) => to.connect_with_connector_lazy(connector(to, role, tls)),
+    }
+}
+
+/// What tonic is given to connect with TLS.
+fn connector(
+    to: &Endpoint,
+    role: Role,
+    tls: &Tls,
+) -> impl Service<Uri, Response = Io, Error = io::Error, Future: Send> + Send + use<> {
+    let address = to.uri().authority().map_or("", |a| a.as_str()).to_owned();
+    let connector = tls.connector.clone();
+    tower::service_fn(move |_| dial(address.clone(), role, connector.clone()))
+}
+
+type Io = TokioIo<TlsStream<TcpStream>>;
+
+async fn dial(address: String, role: Role, connector: TlsConnector) -> io::Result<Io> {
+    let socket = TcpStream::connect(&address).await?;
+    socket.set_nodelay(true)?;
+    let name = ServerName::try_from(role.dns_name()).map_err(io::Error::other)?;
+    let mut stream = connector.connect(name, socket).await?;
+    // With TLS 1.3 the other end judges this one's certificate after this one is done. Whatever it says
+    // first, it says to both; left to a call, its refusal would be one closed connection among others.
+    if stream.fill_buf().await?.is_empty() {
+        return Err(io::ErrorKind::UnexpectedEof.into());
+    }
+    Ok(TokioIo::new(stream))
+}
+
+/// Serves on `listener` until `shutdown` and the end of all open calls; then the log is told what was
+/// refused.
+///
+/// # Errors
+/// The listener is gone.
+pub async fn serve<S>(
+    service: S,
+    listener: TcpListener,
+    tls: Option<&Tls>,
+    shutdown: impl Future<Output = ()>,
+) -> Result<(), tonic::transport::Error>
+where
+    S: Service<
+            Request<Body>,
+            Response = Response<Body>,
+            Error = Infallible,
+            Future: Send + 'static,
+        > + NamedService
+        + Clone
+        + Send
+        + Sync
+        + 'static,
+{
+    let refused = Arc::new(Refused::default());
+    let counting = refused.clone();
+    let services = Server::builder()
+        .http2_keepalive_interval(Some(KEEPALIVE))
+        .http2_keepalive_timeout(Some(ANSWER))
+        .layer(MapResponseLayer::new(move |response: Response<Body>| {
+            counting.count(&response);
+            response
+        }))
+        .add_service(service);
+    let served = match tls {
+        None => {
+            let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+            let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
+            serving.await
+        }
+        Some(tls) => {
+            let incoming = accept::secured(listener, tls.acceptor.clone(), refused.clone());
+            let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
+            serving.await
+        }
+    };
+    refused.tell();
+    served
+}
+
+/// What may help where a plain connection broke before anything was heard.
+pub const WANTS_TLS: &str = "if it wants TLS, give --tls-ca, --tls-cert and --tls-key";
+
+/// Why there is no connection, in words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Trouble {
+    /// One of the two ends does not trust the other: no second try will help.
+    Untrusted(String),
+    /// Nobody is there: another try may help.
+    Unreachable(String),
+    /// Somebody was there, and then not any more: another try may help.
+    Broken(String),
+}
+
+impl Trouble {
+    /// What it means that a connection to a peer of that role, or a call on it, failed with this error.
+    pub fn of(error: &(dyn std::error::Error + 'static), role: Role) -> Self {
+        let all = || std::iter::successors(Some(error), |e| e.source());
+        if let Some(why) = all().find_map(rustls_error).and_then(|e| distrust(e, role)) {
+            return Self::Untrusted(why);
+        }
+        let text = all().last().map_or_else(String::new, ToString::to_string);
+        if all().any(|e| e.downcast_ref::<tonic::ConnectError>().is_some()) {
+            Self::Unreachable(text)
+        } else {
+            Self::Broken(text)
+        }
+    }
+}
+
+/// The TLS error within an error.
+fn rustls_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a rustls::Error> {
+    let within = || error.downcast_ref::<io::Error>()?.get_ref()?.downcast_ref();
+    error.downcast_ref().or_else(within)
+}
+
+/// Why a handshake ended, if one of the ends wanted it so.
+fn distrust(error: &rustls::Error, role: Role) -> Option<String> {
+    use AlertDescription as A;
+    use CertificateError as C;
+    let why = match error {
+        rustls::Error::InvalidMessage(_) => {
+            "it does not speak TLS; give it --tls-ca, --tls-cert and --tls-key, or none of them here"
+        }
+        rustls::Error::PeerIncompatible(_)
+        | rustls::Error::AlertReceived(A::ProtocolVersion | A::NoApplicationProtocol) => {
+            "it speaks another TLS"
+        }
+        rustls::Error::InvalidCertificate(error) => match error {
+            C::NotValidForName | C::NotValidForNameContext { .. } => {
+                return Some(format!("its certificate does not name the role {role}"));
+            }
+            C::Expired | C::ExpiredContext { .. } => "its certificate has expired",
+            C::NotValidYet | C::NotValidYetContext { .. } => {
+                "its certificate is not valid yet; compare the clocks"
+            }
+            _ => "its certificate is not from the authority given",
+        },
+        rustls::Error::AlertReceived(A::CertificateRequired) => "it demands a certificate",
+        rustls::Error::AlertReceived(A::CertificateExpired) => {
+            "it refuses the certificate shown to it, which has expired by its clock"
+        }
+        rustls::Error::AlertReceived(A::UnknownCA | A::DecryptError) => {
+            "it refuses the certificate shown to it, which is not from its authority"
+        }
+        rustls::Error::AlertReceived(
+            A::BadCertificate
+            | A::UnsupportedCertificate
+            | A::CertificateRevoked
+            | A::CertificateUnknown
+            | A::AccessDenied,
+        ) => "it refuses the certificate shown to it",
+        _ => return None,
+    };
+    Some(why.to_owned())
+}
