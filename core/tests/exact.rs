@@ -132,3 +132,18 @@ fn a_lid_that_bends_outward_is_not_skipped_where_the_cutter_is_level() {
         assert_eq!(case.check().err(), None, "step {step}");
     }
 }
+
+/// Where a wheel's very rim meets an edge, its height was estimated by a formula that is rounded
+/// otherwise than the height itself, and the edge given up although it was higher.
+#[test]
+fn an_edge_at_the_rim_is_not_given_up() {
+    let bytes = [
+        54, 244, 0, 41, 0, 0, 37, 0, 72, 153, 18, 0, 25, 0, 116, 199, 22, 0, 0, 0, 55, 10, 0, 0,
+        201, 103, 0, 0, 0, 20,
+    ];
+    let mut case = Case::from_bytes(&bytes).expect("within bounds");
+    for points in [4, 16] {
+        case.job.motion.points_per_revolution = points;
+        assert_eq!(case.check().err(), None, "{points} points");
+    }
+}
