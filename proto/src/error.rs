@@ -2,6 +2,8 @@
 
 use tonic::{Code, Status};
 
+use crate::task::TaskId;
+
 /// Everything that can be wrong with a message, and everything a service refuses.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -71,6 +73,12 @@ pub enum Error {
         /// Its name.
         worker: String,
     },
+    /// Rows that this worker does not hold (any more).
+    #[error("the rows of {id} are not here")]
+    NotHeld {
+        /// By which they were asked for.
+        id: TaskId,
+    },
     /// The job failed on the cluster.
     #[error("{0}")]
     JobFailed(String),
@@ -94,7 +102,7 @@ impl Error {
             Self::Checksum { .. } | Self::Incomplete { .. } => Code::DataLoss,
             Self::TooLarge { .. } => Code::OutOfRange,
             Self::Version { .. } => Code::FailedPrecondition,
-            Self::UnknownWorker { .. } => Code::NotFound,
+            Self::UnknownWorker { .. } | Self::NotHeld { .. } => Code::NotFound,
             Self::JobFailed(_) => Code::Aborted,
             Self::ShuttingDown(_) => Code::Unavailable,
         }
