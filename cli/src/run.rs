@@ -31,6 +31,7 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
             let threads = args.threads.map(usize::from);
             let simd = args.simd.unwrap_or_else(Simd::best);
             let (workers, job) = (file.cluster.workers, file.job);
+            let distribution = file.cluster.distribution;
             if workers == 0 {
                 let threads = threads.unwrap_or_else(system::cores);
                 let run = move || here::run(&part, job, threads, simd, &display, &stop);
@@ -38,7 +39,8 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
                 return run.await.unwrap_or(Err(Error::Interrupted));
             }
             let progress = progress(display);
-            cluster::run(part, job, workers, threads.unwrap_or(1), simd, progress).await
+            let threads = threads.unwrap_or(1);
+            cluster::run(part, job, distribution, workers, threads, simd, progress).await
         },
     )
 }
@@ -51,7 +53,9 @@ pub(crate) fn submit(args: &args::Submit) -> Result<()> {
         {
             return Err(Error::OneProcess);
         }
-        submit::run(part, file.job, &args.master, progress(display)).await
+        let distribution = file.cluster.distribution;
+        let progress = progress(display);
+        submit::run(part, file.job, distribution, &args.master, progress).await
     })
 }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use horma_core::{Job, Part, Record, SubTrajectory, Trajectory, stitch};
+use horma_core::{Distribution, Job, Part, Record, SubTrajectory, Trajectory, stitch};
 use horma_master::{Outcome, Progress};
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::submit_reply::Kind as Reply;
@@ -24,6 +24,7 @@ const KEEPALIVE: Duration = Duration::from_secs(10);
 pub(crate) async fn run(
     part: Part,
     job: Job,
+    distribution: Distribution,
     address: &str,
     progress: Progress,
 ) -> Result<Outcome> {
@@ -48,7 +49,7 @@ pub(crate) async fn run(
 
     progress("send", 0, 0);
     let failed = |status: Status| refusal(address, &status);
-    let replies = client.submit(tokio_stream::iter(requests(part, job)));
+    let replies = client.submit(tokio_stream::iter(requests(part, job, distribution)));
     let mut replies = replies.await.map_err(failed)?.into_inner();
     let bad = |reason: String| Error::BadReply {
         address: address.to_owned(),
@@ -83,10 +84,15 @@ pub(crate) async fn run(
 }
 
 /// The job and its part, packed as they are sent.
-fn requests(part: Part, job: Job) -> impl Iterator<Item = SubmitRequest> + Send + 'static {
+fn requests(
+    part: Part,
+    job: Job,
+    distribution: Distribution,
+) -> impl Iterator<Item = SubmitRequest> + Send + 'static {
     let header = SubmitHeader {
         version: VERSION.to_owned(),
         job: Some(horma_proto::job_to_wire(&job)),
+        distribution: horma_proto::distribution_to_wire(distribution).into(),
     };
     let bodies = part.bodies.into_iter();
     let bodies = Chunks::of(bodies.map(|b| horma_proto::body_to_wire(&b)));

@@ -80,6 +80,7 @@ impl Master {
     pub(crate) fn start(config: Config, shutdown: CancellationToken) -> Self {
         let (inbox, messages) = mpsc::channel(INBOX);
         let (count, workers) = watch::channel(0);
+        let incarnation = incarnation();
         let driver = Driver {
             config,
             begin: Instant::now(),
@@ -87,6 +88,7 @@ impl Master {
             addresses: BTreeMap::new(),
             jobs: BTreeMap::new(),
             next_job: 1,
+            incarnation,
             inbox: inbox.downgrade(),
             count,
         };
@@ -95,7 +97,7 @@ impl Master {
             inbox,
             workers,
             config,
-            incarnation: incarnation(),
+            incarnation,
         }
     }
 
@@ -191,6 +193,7 @@ struct Driver {
     addresses: BTreeMap<String, String>,
     jobs: BTreeMap<u64, RunningJob>,
     next_job: u64,
+    incarnation: u64,
     inbox: mpsc::WeakSender<Message>,
     count: watch::Sender<usize>,
 }
@@ -462,6 +465,7 @@ impl Driver {
         job.calls.insert(task, call);
         job.workers.insert(worker.clone(), address.clone());
         let placing = Placing {
+            master: self.incarnation,
             task,
             address: address.clone(),
             plan: job.plan.clone(),

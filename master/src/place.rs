@@ -21,6 +21,8 @@ const LEAST_ROWS_A_SECOND: f64 = 100.0;
 
 /// All that placing an extent's rows needs.
 pub(crate) struct Placing {
+    /// This start of the master.
+    pub master: u64,
     pub task: TaskId,
     pub address: String,
     pub plan: Arc<Handout>,
@@ -84,6 +86,7 @@ fn requests(
     let placement = wire::Placement {
         id: Some(placing.task.into()),
         rows: placing.rows.len() as u32,
+        master: placing.master,
     };
     let rows = rows_to_wire(placing.plan.clone(), placing.rows.clone());
     let chunks = Chunks::of(rows).map(Request::Rows);
