@@ -6,11 +6,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
-use std::time::Instant;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use horma_core::{
-    Counters, Extent, ExtentRecord, Job, LostAttempt, Part, Phase, Plan, Record, SubTrajectory,
-    WorkerRecord, stitch,
+    Counters, Distribution, Extent, ExtentRecord, Handout, Job, LostAttempt, Part, Phase, Record,
+    SubTrajectory, Traffic, WorkerRecord, stitch,
 };
 use horma_proto::TaskId;
 use tokio::sync::{mpsc, oneshot, watch};
@@ -19,7 +19,8 @@ use tracing::{info, warn};
 
 use crate::dispatch::{Attempt, Delivery, Undelivered, dispatch};
 use crate::error::{Error, Result};
-use crate::state::{Command, Event, State, apply};
+use crate::place::{Placed, Placing, place};
+use crate::state::{Command, Event, Fault, Held, State, Step, apply};
 use crate::{Config, Outcome, Progress};
 
 /// Messages that may wait for the driver.
@@ -31,6 +32,14 @@ pub struct Master {
     inbox: mpsc::Sender<Message>,
     workers: watch::Receiver<usize>,
     config: Config,
+    /// New each time a master starts: it counts its jobs anew.
+    pub(crate) incarnation: u64,
+}
+
+/// The jobs that are going on, and the number of the next one.
+pub(crate) struct Going {
+    pub jobs: Vec<u64>,
+    pub next_job: u64,
 }
 
 /// What the driver is told.
@@ -45,11 +54,11 @@ pub(crate) enum Message {
     Heartbeat {
         worker: String,
         incarnation: u64,
-        /// Whether it is known.
-        reply: oneshot::Sender<bool>,
+        /// What is going on, if it is known.
+        reply: oneshot::Sender<Option<Going>>,
     },
     Run {
-        plan: Arc<Plan>,
+        plan: Arc<Handout>,
         parts: u32,
         progress: Progress,
         reply: oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>,
@@ -59,12 +68,19 @@ pub(crate) enum Message {
         task: TaskId,
         outcome: std::result::Result<Delivery, Undelivered>,
     },
+    /// Rows are placed, or not.
+    Placed {
+        worker: String,
+        task: TaskId,
+        outcome: std::result::Result<Placed, Fault>,
+    },
 }
 
 impl Master {
     pub(crate) fn start(config: Config, shutdown: CancellationToken) -> Self {
         let (inbox, messages) = mpsc::channel(INBOX);
         let (count, workers) = watch::channel(0);
+        let incarnation = incarnation();
         let driver = Driver {
             config: config.clone(),
             begin: Instant::now(),
@@ -72,6 +88,7 @@ impl Master {
             addresses: BTreeMap::new(),
             jobs: BTreeMap::new(),
             next_job: 1,
+            incarnation,
             inbox: inbox.downgrade(),
             count,
         };
@@ -80,6 +97,7 @@ impl Master {
             inbox,
             workers,
             config,
+            incarnation,
         }
     }
 
@@ -99,12 +117,13 @@ impl Master {
         &self,
         part: Part,
         job: Job,
+        distribution: Distribution,
         at_least: usize,
         progress: Progress,
     ) -> Result<Outcome> {
         let begin = Instant::now();
         progress("discretize", 0, 0);
-        let plan = Arc::new(crate::plan(part, job, self.config.memory).await?);
+        let plan = Arc::new(crate::plan(part, job, distribution, self.config.memory).await?);
         let discretized = begin.elapsed();
         let parts = self.gather(at_least.max(1)).await?;
 
@@ -134,7 +153,7 @@ impl Master {
             seconds: time.as_secs_f64(),
         })
         .into();
-        record.bodies.clone_from(&plan.model.bodies);
+        record.bodies.clone_from(&plan.bodies);
         Ok((path, record))
     }
 
@@ -161,6 +180,12 @@ impl Master {
     }
 }
 
+/// A number that no earlier start of a master had.
+fn incarnation() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |t| t.as_nanos() as u64)
+}
+
 struct Driver {
     config: Config,
     begin: Instant,
@@ -168,12 +193,13 @@ struct Driver {
     addresses: BTreeMap<String, String>,
     jobs: BTreeMap<u64, RunningJob>,
     next_job: u64,
+    incarnation: u64,
     inbox: mpsc::WeakSender<Message>,
     count: watch::Sender<usize>,
 }
 
 struct RunningJob {
-    plan: Arc<Plan>,
+    plan: Arc<Handout>,
     extents: Vec<Extent>,
     /// How many extents need each row.
     users: Vec<u32>,
@@ -181,7 +207,9 @@ struct RunningJob {
     /// Positions that have arrived.
     arrived: Arc<AtomicU64>,
     /// What was delivered and kept, by extent.
-    kept: BTreeMap<u32, (SubTrajectory, ExtentRecord)>,
+    kept: BTreeMap<u32, (Vec<SubTrajectory>, ExtentRecord)>,
+    /// What placing rows has taken so far, by extent.
+    placed: BTreeMap<u32, Placed>,
     lost: Vec<LostAttempt>,
     /// Calls under way: each ends when it is told why, or when the job is dropped.
     calls: BTreeMap<TaskId, oneshot::Sender<String>>,
@@ -257,7 +285,11 @@ impl Driver {
                 if known {
                     self.apply(Event::Heartbeat { worker }, None);
                 }
-                let _ = reply.send(known);
+                let going = known.then(|| Going {
+                    jobs: self.state.jobs().collect(),
+                    next_job: self.next_job,
+                });
+                let _ = reply.send(going);
             }
             Message::Run {
                 plan,
@@ -276,10 +308,14 @@ impl Driver {
                 );
                 progress("digitize", 0, plan.trajectory.positions);
                 let count = extents.len() as u32;
-                let mut users = vec![0; plan.model.rows.len()];
+                let mut users = vec![0; plan.outlines.len()];
                 for &row in extents.iter().flat_map(|e| &e.rows) {
                     users[row as usize] += 1;
                 }
+                let halos = match plan.distribution {
+                    Distribution::Overlap | Distribution::Surface => None,
+                    Distribution::Halo => Some(extents.iter().map(halo).collect()),
+                };
                 let running = RunningJob {
                     plan,
                     extents,
@@ -287,6 +323,7 @@ impl Driver {
                     progress,
                     arrived: Arc::default(),
                     kept: BTreeMap::new(),
+                    placed: BTreeMap::new(),
                     lost: Vec::new(),
                     calls: BTreeMap::new(),
                     workers: BTreeMap::new(),
@@ -297,6 +334,7 @@ impl Driver {
                     Event::Submitted {
                         job,
                         extents: count,
+                        halos,
                     },
                     None,
                 );
@@ -306,6 +344,43 @@ impl Driver {
                 task,
                 outcome,
             } => self.over(worker, task, outcome),
+            Message::Placed {
+                worker,
+                task,
+                outcome,
+            } => self.placed(worker, task, outcome),
+        }
+    }
+
+    /// Rows are placed, or not.
+    fn placed(
+        &mut self,
+        worker: String,
+        task: TaskId,
+        outcome: std::result::Result<Placed, Fault>,
+    ) {
+        let Some(job) = self.jobs.get_mut(&task.job) else {
+            return;
+        };
+        job.calls.remove(&task);
+        match outcome {
+            Ok(placed) => {
+                info!(%task, worker, rows = placed.rows, "placed");
+                *job.placed.entry(task.extent).or_default() += placed;
+                self.apply(Event::Placed { worker, task }, None);
+            }
+            Err(fault) => {
+                warn!(%task, worker, ?fault, "not placed");
+                job.lose(&worker, task, &fault, 0);
+                let step = Step::Place;
+                let failed = Event::Failed {
+                    worker,
+                    task,
+                    step,
+                    fault,
+                };
+                self.apply(failed, None);
+            }
         }
     }
 
@@ -330,22 +405,15 @@ impl Driver {
                 positions_received,
             }) => {
                 warn!(%task, worker, ?fault, positions_received, "not delivered");
-                job.lost.push(LostAttempt {
-                    extent: task.extent,
-                    attempt: task.attempt,
-                    worker: worker.clone(),
-                    positions_received,
-                    positions: job.extents[task.extent as usize].count,
-                    reason: fault.to_string(),
-                });
-                self.apply(
-                    Event::Failed {
-                        worker,
-                        task,
-                        fault,
-                    },
-                    None,
-                );
+                job.lose(&worker, task, &fault, positions_received);
+                let step = Step::Digitize;
+                let failed = Event::Failed {
+                    worker,
+                    task,
+                    step,
+                    fault,
+                };
+                self.apply(failed, None);
             }
         }
     }
@@ -353,7 +421,8 @@ impl Driver {
     fn apply(&mut self, event: Event, mut delivery: Option<Delivery>) {
         for command in apply(&mut self.state, self.begin.elapsed(), event) {
             match command {
-                Command::Start { worker, task } => self.start(worker, task),
+                Command::Place { worker, task } => self.place(worker, task),
+                Command::Start { worker, task, rows } => self.start(worker, task, rows),
                 Command::Abort { task, reason } => {
                     info!(%task, reason, "aborted");
                     let job = self.jobs.get_mut(&task.job);
@@ -385,8 +454,42 @@ impl Driver {
         }
     }
 
+    /// Brings an extent's own rows to a worker, in the background.
+    fn place(&mut self, worker: String, task: TaskId) {
+        let (Some(job), Some(address)) =
+            (self.jobs.get_mut(&task.job), self.addresses.get(&worker))
+        else {
+            return;
+        };
+        let (call, cut_off) = oneshot::channel();
+        job.calls.insert(task, call);
+        job.workers.insert(worker.clone(), address.clone());
+        let placing = Placing {
+            master: self.incarnation,
+            task,
+            address: address.clone(),
+            tls: self.config.tls.clone(),
+            plan: job.plan.clone(),
+            rows: job.extents[task.extent as usize].own.clone(),
+        };
+        info!(%task, worker, rows = placing.rows.len(), "placing");
+        let inbox = self.inbox.clone();
+        tokio::spawn(async move {
+            let outcome = place(placing, cut_off).await;
+            if let Some(inbox) = inbox.upgrade() {
+                let placed = Message::Placed {
+                    worker,
+                    task,
+                    outcome,
+                };
+                // The driver may have stopped: then nobody waits for this.
+                let _ = inbox.send(placed).await;
+            }
+        });
+    }
+
     /// Brings a task to a worker, in the background.
-    fn start(&mut self, worker: String, task: TaskId) {
+    fn start(&mut self, worker: String, task: TaskId, rows: Vec<Held>) {
         let (Some(job), Some(address)) =
             (self.jobs.get_mut(&task.job), self.addresses.get(&worker))
         else {
@@ -397,6 +500,10 @@ impl Driver {
         job.workers.insert(worker.clone(), address.clone());
         let extent = job.extents[task.extent as usize].clone();
         let shared = |row: &&u32| job.users[**row as usize] > 1;
+        let located = |held: Held| {
+            let address = self.addresses.get(&held.worker).cloned();
+            (held, address.unwrap_or_default())
+        };
         let attempt = Attempt {
             task,
             worker: worker.clone(),
@@ -404,6 +511,7 @@ impl Driver {
             plan: job.plan.clone(),
             overlap_rows: extent.rows.iter().filter(shared).count() as u32,
             extent,
+            holders: rows.into_iter().map(located).collect(),
             arrived: job.arrived.clone(),
             progress: job.progress.clone(),
             tls: self.config.tls.clone(),
@@ -425,19 +533,49 @@ impl Driver {
     }
 }
 
+/// The other extents whose rows one needs.
+fn halo(extent: &Extent) -> Vec<u32> {
+    extent.halo.iter().map(|h| h.extent).collect()
+}
+
 impl RunningJob {
+    /// Writes down an attempt that came to nothing.
+    fn lose(&mut self, worker: &str, task: TaskId, fault: &Fault, positions_received: u64) {
+        self.lost.push(LostAttempt {
+            extent: task.extent,
+            attempt: task.attempt,
+            worker: worker.to_owned(),
+            positions_received,
+            positions: self.extents[task.extent as usize].count,
+            reason: fault.to_string(),
+        });
+    }
+
     /// Hands over what was kept.
     fn complete(self) {
         let mut counters = Counters::default();
+        let mut traffic = Traffic {
+            rows_needed: self.users.iter().filter(|&&n| n > 0).count() as u64,
+            ..Traffic::default()
+        };
         let (mut parts, mut extents) = (Vec::new(), Vec::new());
-        for (positions, record) in self.kept.into_values() {
+        for (extent, (positions, mut record)) in self.kept {
+            let placed = self.placed.get(&extent).copied().unwrap_or_default();
+            record.rows_sent += placed.rows;
+            record.bytes_sent += placed.bytes;
+            record.place_seconds = placed.seconds;
+            traffic.rows_sent += record.rows_sent;
+            traffic.bytes_to_workers += record.bytes_sent;
+            traffic.bytes_between_workers += record.bytes_fetched;
+            traffic.bytes_of_results += record.bytes_received;
             counters += record.counters;
-            parts.push(positions);
+            parts.extend(positions);
             extents.push(record);
         }
         let worker = |(worker, address)| WorkerRecord { worker, address };
         let record = Record {
             counters,
+            traffic: Some(traffic),
             workers: self.workers.into_iter().map(worker).collect(),
             extents,
             lost: self.lost,
