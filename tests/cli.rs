@@ -465,6 +465,98 @@ fn the_local_search_tells_its_windows_and_what_it_lost() {
 }
 
 #[test]
+fn positions_are_inserted_where_straight_moves_would_gouge() {
+    let dir = scratch();
+    let part = sample().with_file_name("last.step");
+    let coarse = job(dir.path(), "coarse.toml", &[&part], GOOD);
+    let finer = GOOD.replace("[motion]", "[motion]\npath_tolerance = 0.02");
+    let finer = job(dir.path(), "finer.toml", &[&part], &finer);
+    let results = |job: &Path, name: &str, more: &[&str]| {
+        let out = dir.path().join(name);
+        let mut all = vec!["run", text(job), "-o", text(&out)];
+        all.extend(more);
+        let said = succeed(&all);
+        let read = |file: &str| std::fs::read_to_string(out.join(file)).expect("a result");
+        (said, read("path.csv"), read("path.ngc"), report(&out))
+    };
+    let (_, plain, _, before) = results(&coarse, "coarse", &[]);
+    let (said, csv, program, after) = results(&finer, "finer", &[]);
+    let gouge = |report: &serde_json::Value| {
+        report["verification"]["normal"]["motion_gouge"]["depth"].as_f64()
+    };
+    assert!(gouge(&before) > Some(1.0), "{:?}", gouge(&before));
+    assert!(gouge(&after) < Some(0.03), "{:?}", gouge(&after));
+    assert_eq!(after["job"]["motion"]["path_tolerance"], 0.02);
+    let (positions, inserted) = (&after["path"]["positions"], &after["path"]["inserted"]);
+    assert!(
+        said.contains(&format!(
+            "{positions} positions, {inserted} of them inserted"
+        )),
+        "{said}"
+    );
+    assert!(after["path"]["beyond_tolerance"].is_u64());
+
+    // The positions of the motion are what they were, and the others lie between them.
+    let is_inserted = |line: &&str| line.split(',').next().is_some_and(|i| i.contains('.'));
+    let whole: Vec<&str> = csv.lines().filter(|l| !is_inserted(l)).collect();
+    assert_eq!(whole, plain.lines().collect::<Vec<_>>());
+    assert_eq!(
+        csv.lines().filter(is_inserted).count() as u64,
+        inserted.as_u64().expect("a count")
+    );
+    let start: f64 = plain
+        .lines()
+        .nth(1)
+        .and_then(|l| l.split(',').nth(1)?.parse().ok())
+        .expect("x");
+    for line in csv.lines().filter(is_inserted) {
+        let number = |k: usize| line.split(',').nth(k).and_then(|n| n.parse::<f64>().ok());
+        let [index, x, angle] = [0, 1, 2].map(|k| number(k).expect("a number"));
+        assert!((x - (start + 20.0 * index / 12.0)).abs() < 1e-9, "{line}");
+        assert!((angle - 30.0 * index).abs() < 1e-9, "{line}");
+    }
+    let moves = program.lines().filter(|l| l.starts_with("G1 X")).count();
+    assert_eq!(
+        moves + 2,
+        csv.lines().count(),
+        "one to each position but the first"
+    );
+
+    // By flag, variable or file, and by any search, it is the same.
+    let flag = ["--path-tolerance", "0.02"];
+    assert!(results(&coarse, "flag", &flag).1 == csv);
+    assert!(results(&finer, "brute", &["--method", "brute"]).1 == csv);
+
+    // A path is held to its job's tolerance, wherever it comes from.
+    let [coarse_csv, finer_csv] = ["coarse", "finer"].map(|d| dir.path().join(d).join("path.csv"));
+    succeed(&["verify", text(&finer_csv), text(&finer)]);
+    succeed(&["verify", text(&coarse_csv), text(&coarse)]);
+    let words = ["straight move gouges", "path tolerance", "travel"];
+    let verify = run(&["verify", text(&coarse_csv), text(&finer)]);
+    let (_, err) = texts(&verify);
+    assert_eq!(verify.status.code(), Some(3), "{err}");
+    assert!(words.iter().all(|w| err.contains(w)), "{err}");
+
+    // What cannot be: a tolerance of nothing, and no heights between positions.
+    let out = dir.path().join("refused");
+    let local = ["--method", "local", "--contact", "point", "--no-fallback"];
+    let refused: [(&[&str], i32, &[&str]); 3] = [
+        (
+            &["--path-tolerance", "0"],
+            2,
+            &["--path-tolerance", "at least"],
+        ),
+        (&[&local[..], &flag].concat(), 2, &["without its fallback"]),
+        (&["--path-tolerance", "nan"], 2, &["path_tolerance is NaN"]),
+    ];
+    for (more, code, words) in refused {
+        let mut all = vec!["run", text(&coarse), "-o", text(&out), "-q"];
+        all.extend(more);
+        check(&all, code, words);
+    }
+}
+
+#[test]
 fn every_instruction_set_gives_the_same_bytes() {
     let dir = scratch();
     let part = sample().with_file_name("last.step");

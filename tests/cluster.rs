@@ -166,6 +166,63 @@ fn a_mesh_has_no_surfaces_to_send() {
     drop(master);
 }
 
+/// Positions inserted between others, by any number of processes and threads, and through a master.
+#[test]
+fn what_is_inserted_is_the_same_on_any_number_of_workers() {
+    let (dir, sample_job) = (scratch(), sample());
+    let base = ["--path-tolerance", "0.005", "--points-per-revolution", "72"];
+    for more in [&[][..], &["--contact", "point"]] {
+        let given = [&base[..], more].concat();
+        let alone = path_of(&sample(), dir.path(), "alone", &given);
+        let inserted = |name: &str| report(&dir.path().join(name))["path"]["inserted"].as_u64();
+        let expected = inserted("alone");
+        assert!(expected > Some(1000), "{expected:?}");
+        for count in ["1", "2", "3", "5"] {
+            let args = [&given[..], &["--workers", count]].concat();
+            let path = path_of(&sample(), dir.path(), count, &args);
+            assert!(path == alone, "{more:?} on {count} workers");
+            assert_eq!(inserted(count), expected);
+        }
+        let args = [&given[..], &["--threads", "1"]].concat();
+        assert!(path_of(&sample(), dir.path(), "thread", &args) == alone);
+        let (_master, address) = master(&[]);
+        let _worker = worker(&address, "w");
+        let out = dir.path().join("submitted");
+        let mut submit = vec![
+            "submit",
+            text(&sample_job),
+            "-o",
+            text(&out),
+            "-q",
+            "--no-verify",
+        ];
+        submit.extend(["--master", &address]);
+        submit.extend(&given);
+        succeed(&submit);
+        assert!(std::fs::read(out.join("path.csv")).expect("a path") == alone);
+    }
+    // Extents narrower than the cutter, rings, brute force.
+    let coarse = [
+        "--step",
+        "40",
+        "--points-per-revolution",
+        "12",
+        "--path-tolerance",
+        "0.02",
+    ];
+    let alone = path_of(&sample(), dir.path(), "coarse", &coarse);
+    let others: [&[&str]; 2] = [&["--workers", "8"], &["--method", "brute"]];
+    for more in others {
+        let other = path_of(
+            &sample(),
+            dir.path(),
+            "coarse",
+            &[&coarse[..], more].concat(),
+        );
+        assert!(other == alone, "{more:?}");
+    }
+}
+
 /// Every cutter, motion and contact, on extents narrower than the cutter, against brute force.
 #[test]
 fn every_kind_of_job_is_the_same_by_brute_force_and_on_workers() {

@@ -243,7 +243,21 @@ async fn register(
 
 fn positions(task: wire::Task, skip: u64, count: u64) -> DigitizeReply {
     let touches = vec![None; count as usize];
-    let positions = horma_proto::pack_positions(task.first + skip, &touches);
+    let positions = horma_proto::pack_positions(task.first + skip, &touches, &[]);
+    DigitizeReply {
+        id: task.id,
+        kind: Some(Kind::Positions(positions)),
+    }
+}
+
+/// The first position of a task, and one inserted on the move from it or from another.
+fn inserted(task: wire::Task, from: u64) -> DigitizeReply {
+    let index = horma_core::Index::between(task.first + from, 512);
+    let between = [horma_core::Inserted {
+        index: index.expect("between"),
+        touch: None,
+    }];
+    let positions = horma_proto::pack_positions(task.first, &[None], &between);
     DigitizeReply {
         id: task.id,
         kind: Some(Kind::Positions(positions)),
@@ -252,7 +266,7 @@ fn positions(task: wire::Task, skip: u64, count: u64) -> DigitizeReply {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn workers_that_answer_wrongly_are_found_out() {
-    let lies: [(&str, Lie); 5] = [
+    let lies: [(&str, Lie); 7] = [
         ("checksum", |task| {
             let mut reply = positions(task, 0, 10);
             if let Some(Kind::Positions(p)) = &mut reply.kind {
@@ -265,6 +279,8 @@ async fn workers_that_answer_wrongly_are_found_out() {
             let too_many = task.count + 1;
             positions(task, 0, too_many)
         }),
+        ("nobody asked for", |task| inserted(task, 0)),
+        ("was inserted after", |task| inserted(task, 1)),
         ("it speaks of", |task| {
             let mut reply = positions(task, 0, 10);
             if let Some(id) = &mut reply.id {

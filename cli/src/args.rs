@@ -111,7 +111,8 @@ pub(crate) struct Verify {
     /// The job file (TOML): its part, cutter and step
     #[arg(value_name = "JOB")]
     pub job: PathBuf,
-    /// Deepest gouge allowed, normal to the surface, mm [default: the job's chordal tolerance]
+    /// Deepest gouge allowed, normal to the surface, mm [default: the job's chordal tolerance]; on
+    /// straight moves the job's path tolerance comes on top, if it has one
     #[arg(long, value_name = "MM")]
     pub tolerance: Option<f64>,
     /// Distance between samples of the surface, mm [default: such that there are about 240000]
@@ -254,6 +255,15 @@ pub(crate) struct Job {
         help_heading = "Instead of the job file's"
     )]
     pub to: Option<f64>,
+    /// How far a straight move between positions may stray along the attack axis before positions are
+    /// inserted, mm
+    #[arg(
+        long,
+        value_name = "MM",
+        env = "HORMA_PATH_TOLERANCE",
+        help_heading = "Instead of the job file's"
+    )]
+    pub path_tolerance: Option<f64>,
     /// Feed at the contact, mm/min
     #[arg(
         long,
@@ -296,6 +306,7 @@ impl Job {
             points_per_revolution: self.points_per_revolution,
             from: self.from,
             to: self.to,
+            path_tolerance: self.path_tolerance,
             feed: self.feed,
             clearance: self.clearance,
         }

@@ -13,7 +13,7 @@ mod turns;
 use std::io::Write;
 use std::path::Path;
 
-use horma_core::place;
+use horma_core::{Motion, place};
 use horma_formats::job::{self, JobFile, Overrides};
 use horma_formats::output::{self, Staging};
 use horma_formats::{part, plot as diagram, sample};
@@ -85,7 +85,11 @@ fn subject(job: Option<&Path>, display: &Display) -> Result<Subject> {
         name,
         part: place(part, file.axis)?,
         cutter: file.job.cutter,
-        motion: file.job.motion,
+        // Searches are compared position by position.
+        motion: Motion {
+            path_tolerance: None,
+            ..file.job.motion
+        },
     })
 }
 

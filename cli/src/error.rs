@@ -77,6 +77,15 @@ pub(crate) enum Error {
         x: f64,
         angle: f64,
     },
+    #[error("a straight move gouges the part by {depth:.4} mm, more than the {limit} mm of chordal and path tolerance together, at [{:.3}, {:.3}, {:.3}] of the part (after position {position}: travel {x:.3}, angle {angle:.2}°); ask for more points_per_revolution or a finer path_tolerance, or skip the verification with --no-verify", point[0], point[1], point[2])]
+    MotionGouge {
+        depth: f64,
+        limit: f64,
+        point: [f64; 3],
+        position: u64,
+        x: f64,
+        angle: f64,
+    },
     #[error(
         "without its fallback, or without delta_u and delta_v, the local search goes over the whole path in one process; use `horma run` without workers"
     )]
@@ -97,7 +106,8 @@ impl Error {
             Self::Formats(horma_formats::Error::NoContact { .. })
             | Self::Impossible { .. }
             | Self::Differs { .. }
-            | Self::Gouge { .. } => 3,
+            | Self::Gouge { .. }
+            | Self::MotionGouge { .. } => 3,
             Self::Master(horma_master::Error::Plan(e)) => of_core(e),
             Self::Formats(_)
             | Self::Bind { .. }

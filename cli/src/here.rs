@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use horma_core::{
-    Counters, Digitizer, Heuristic, Job, Local, Method, Part, Phase, Plan, Record, Simd,
-    SubTrajectory, ToolPath, stitch,
+    Counters, Digitizer, Heuristic, Job, Local, Method, Part, Phase, Plan, Record, Simd, ToolPath,
+    stitch,
 };
 use horma_master::Outcome;
 use tokio_util::sync::CancellationToken;
@@ -66,6 +66,7 @@ fn pipeline(
                 let path = ToolPath {
                     trajectory,
                     touches,
+                    between: Vec::new(),
                 };
                 (path, counters)
             };
@@ -108,17 +109,19 @@ fn digitize(
     display.tell("digitize", 0, total);
     let begin = Instant::now();
     let mut parts = Vec::new();
-    let mut done = 0;
-    let counters = digitizer.run_chunks(&plan.trajectory, 0..total, |first, touches| {
-        done += touches.len() as u64;
-        display.tell("digitize", done, total);
-        parts.push(SubTrajectory { first, touches });
-        !stop.is_cancelled()
+    let (mut inserted, mut fits) = (0, Ok(()));
+    let counters = digitizer.run_chunks(&plan.trajectory, 0..total, |run| {
+        display.tell("digitize", run.end(), total);
+        inserted += run.between.len() as u64;
+        fits = plan.check_inserted(inserted);
+        parts.push(run);
+        fits.is_ok() && !stop.is_cancelled()
     });
     timed("digitize", begin);
     if stop.is_cancelled() {
         return Err(Error::Interrupted);
     }
+    fits?;
 
     display.tell("stitch", 0, 0);
     let begin = Instant::now();

@@ -120,7 +120,7 @@ fn perform(
             version: VERSION.to_owned(),
             job: file.echo(),
             warnings,
-            path: PathStatistics::of(&path),
+            path: PathStatistics::of(&path, &record.counters),
             verification,
             record,
         };
@@ -146,7 +146,7 @@ async fn verified(
     let checking = tokio::task::spawn_blocking(move || {
         let found = verify::check(&part, &file, &positions, None, threads)?;
         if let Some(tolerance) = verify::tolerance(&file) {
-            verify::hold(&found, tolerance)?;
+            verify::hold(&found, tolerance, file.job.motion.path_tolerance)?;
         }
         Ok(found)
     });
@@ -239,8 +239,18 @@ fn summarize(dir: &Path, report: &Report) {
     let verification = report.verification.as_ref();
     let verification = verification.map_or(String::new(), |v| format!("\n{}", verify::describe(v)));
     let path = &report.path;
+    let inserted = match path.inserted {
+        0 => String::new(),
+        n => format!(", {n} of them inserted"),
+    };
+    let beyond = match path.beyond_tolerance {
+        0 => String::new(),
+        n => format!(
+            "\n{n} straight moves stray farther than the path tolerance: there the height jumps"
+        ),
+    };
     say(&format!(
-        "{} positions, {} without contact{lost}{window}{verification}\n{}\n{}\n{}\n{}",
+        "{} positions{inserted}, {} without contact{beyond}{lost}{window}{verification}\n{}\n{}\n{}\n{}",
         path.positions,
         path.without_contact,
         dir.join(output::PATH).display(),

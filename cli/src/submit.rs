@@ -1,6 +1,6 @@
 //! A run on a master elsewhere: the part goes out, the path comes back.
 
-use horma_core::{Distribution, Job, Part, Record, SubTrajectory, Trajectory, stitch};
+use horma_core::{Distribution, Job, Part, Record, Trajectory, stitch};
 use horma_master::{Outcome, Progress};
 use horma_proto::transport::{self, Trouble, WANTS_TLS};
 use horma_proto::wire::master_client::MasterClient;
@@ -52,11 +52,11 @@ pub(crate) async fn run(
                 let header = horma_proto::trajectory_from_wire(header.trajectory.as_ref());
                 trajectory = Some(header.map_err(|e| bad(e.to_string()))?);
             }
-            Some(Reply::Positions(positions)) => parts.push(SubTrajectory {
-                first: positions.first,
-                touches: horma_proto::unpack_positions(&positions)
-                    .map_err(|e| bad(e.to_string()))?,
-            }),
+            Some(Reply::Positions(positions)) => {
+                let count = trajectory.map_or(0, |t| t.positions);
+                let run = horma_proto::unpack_positions(&positions, count);
+                parts.push(run.map_err(|e| bad(e.to_string()))?);
+            }
             Some(Reply::Record(json)) => {
                 let record: Record =
                     serde_json::from_slice(&json).map_err(|e| bad(e.to_string()))?;

@@ -30,7 +30,8 @@ pub(crate) fn verify(args: &args::Verify) -> Result<()> {
         say(&describe(&verification));
     }
     let tolerance = args.tolerance.or(tolerance(&file));
-    tolerance.map_or(Ok(()), |tolerance| hold(&verification, tolerance))
+    let path_tolerance = file.job.motion.path_tolerance;
+    tolerance.map_or(Ok(()), |t| hold(&verification, t, path_tolerance))
 }
 
 /// Verifies positions on `threads` threads.
@@ -54,19 +55,37 @@ pub(crate) fn tolerance(file: &JobFile) -> Option<f64> {
     }
 }
 
-/// Refuses a path that gouges deeper than `tolerance`, mm.
-pub(crate) fn hold(verification: &Verification, tolerance: f64) -> Result<()> {
-    match verification.normal.gouge {
-        Some(gouge) if gouge.depth > tolerance => Err(Error::Gouge {
+/// Refuses a path that gouges deeper than `tolerance` at a position or, if it has a path tolerance,
+/// deeper than both together on a straight move; mm.
+pub(crate) fn hold(
+    verification: &Verification,
+    tolerance: f64,
+    path_tolerance: Option<f64>,
+) -> Result<()> {
+    let found = verification.normal;
+    let deeper = |gouge: Option<Gouge>, limit: f64| gouge.filter(|g| g.depth > limit);
+    if let Some(gouge) = deeper(found.gouge, tolerance) {
+        return Err(Error::Gouge {
             depth: gouge.depth,
             tolerance,
             point: gouge.point,
             position: gouge.position,
             x: gouge.x,
             angle: gouge.angle,
-        }),
-        _ => Ok(()),
+        });
     }
+    let limit = path_tolerance.map_or(f64::INFINITY, |p| tolerance + p);
+    if let Some(gouge) = deeper(found.motion_gouge, limit) {
+        return Err(Error::MotionGouge {
+            depth: gouge.depth,
+            limit,
+            point: gouge.point,
+            position: gouge.position,
+            x: gouge.x,
+            angle: gouge.angle,
+        });
+    }
+    Ok(())
 }
 
 /// What was found, in words.

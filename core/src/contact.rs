@@ -222,12 +222,16 @@ fn in_reach(cutter: &Cutter, [d, _, z]: Point) -> bool {
 
 /// F along an edge, at one place of it.
 struct Rise {
-    /// F's slope times `scale`: it stays finite at the end of the reach, and does not vanish there with
+    /// F's slope times a scale: it stays finite at the end of the reach, and does not vanish there with
     /// the radius of a ball.
     sign: f64,
+    /// That scale, or 0 where the height is not sure.
     scale: f64,
     height: f64,
 }
+
+/// Share of a rounding's radius up to which its flank counts as close to the rim.
+const CLOSE: f64 = 0.1;
 
 impl Rise {
     /// At a point seen from the cutter, along `step`.
@@ -241,18 +245,24 @@ impl Rise {
                 let root = ((minor_radius - d) * (minor_radius + d)).max(0.0).sqrt();
                 let m = major_radius + root;
                 let rise = ((m - z) * (m + z)).max(0.0).sqrt();
+                // Close to the rim [`Cutter::profile`] is rounded otherwise, and heights with it.
+                let sure = if root > CLOSE * minor_radius {
+                    1.0
+                } else {
+                    0.0
+                };
                 let height = y + rise;
                 if step[0] == 0.0 {
                     return Self {
                         sign: step[1] * rise - z * step[2],
-                        scale: rise,
+                        scale: sure * rise,
                         height,
                     };
                 }
                 let share = if m > 0.0 { root / m } else { 1.0 };
                 Self {
                     sign: step[1] * rise * share - d * step[0] - z * step[2] * share,
-                    scale: rise * share,
+                    scale: sure * rise * share,
                     height,
                 }
             }

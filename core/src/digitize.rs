@@ -9,6 +9,7 @@ use std::ops::Range;
 use fearless_simd::Simd as Vectors;
 use rayon::prelude::*;
 
+use crate::between::{self, Probe};
 use crate::blocks::{facet_blocks, facet_leaf, point_blocks, point_leaf};
 use crate::contact::{Pose, least_height};
 use crate::cutter::Cutter;
@@ -16,8 +17,8 @@ use crate::job::{Contact, Job, Local, Method, Window};
 use crate::lanes::LANES;
 use crate::leaf::{FacetLeaf, Leaf, PointLeaf};
 use crate::local::{self, Grids};
-use crate::motion::Trajectory;
-use crate::path::Touch;
+use crate::motion::{Motion, Trajectory};
+use crate::path::{SubTrajectory, Touch};
 use crate::record::Counters;
 use crate::row::{Row, starts};
 use crate::simd::{Simd, with_simd};
@@ -27,10 +28,17 @@ use crate::tree::{Start, Tree};
 /// Positions that one thread takes at a time: these many at least, and a few revolutions.
 const CHUNK: u64 = 256;
 
+/// Chunks of each thread that are held at a time, to be delivered in order; fewer where positions are
+/// inserted, of which a chunk may have a thousand times as many as others.
+const ROUND: u64 = 8;
+const ROUND_BETWEEN: u64 = 2;
+
 /// Rows made ready to be searched.
 #[derive(Debug)]
 pub struct Digitizer {
     cutter: Cutter,
+    /// How far straight moves may stray, mm.
+    path_tolerance: Option<f64>,
     simd: Simd,
     search: Search,
 }
@@ -64,6 +72,7 @@ impl Digitizer {
         };
         Self {
             cutter: job.cutter,
+            path_tolerance: job.motion.path_tolerance,
             simd,
             search,
         }
@@ -79,35 +88,37 @@ impl Digitizer {
         }
     }
 
-    /// Digitizes consecutive positions on the current thread pool, chunk by chunk, in order.
-    /// `deliver` gets each chunk's first position and its touches; it returns `false` to stop.
+    /// Digitizes consecutive positions on the current thread pool, chunk by chunk, in order, each with
+    /// what is inserted on the moves that begin there. `deliver` gets each chunk; it returns `false` to
+    /// stop.
     pub fn run_chunks(
         &self,
         trajectory: &Trajectory,
         positions: Range<u64>,
-        mut deliver: impl FnMut(u64, Vec<Option<Touch>>) -> bool,
+        mut deliver: impl FnMut(SubTrajectory) -> bool,
     ) -> Counters {
         let directions = trajectory.directions();
         let threads = rayon::current_num_threads() as u64;
         let chunk = CHUNK
             .max(2 * u64::from(trajectory.points_per_revolution))
             .min(4096);
+        let round = match self.path_tolerance {
+            None => ROUND,
+            Some(_) => ROUND_BETWEEN,
+        };
         let mut counters = Counters::default();
         let mut next = positions.start;
         while next < positions.end {
             // A few chunks for each thread at a time keep the results in order and in bounds.
-            let end = positions.end.min(next + 8 * threads * chunk);
+            let end = positions.end.min(next + round * threads * chunk);
             let starts: Vec<u64> = (next..end).step_by(chunk as usize).collect();
             let chunks: Vec<_> = starts
                 .into_par_iter()
-                .map(|start| {
-                    let run = start..end.min(start + chunk);
-                    (start, self.run(trajectory, &directions, run))
-                })
+                .map(|start| self.run(trajectory, &directions, start..end.min(start + chunk)))
                 .collect();
-            for (start, (touches, cost)) in chunks {
+            for (chunk, cost) in chunks {
                 counters += cost;
-                if !deliver(start, touches) {
+                if !deliver(chunk) {
                     return counters;
                 }
             }
@@ -116,14 +127,52 @@ impl Digitizer {
         counters
     }
 
-    /// Digitizes consecutive positions on this thread.
+    /// Digitizes consecutive positions on this thread, and the moves that begin there.
     fn run(
         &self,
         trajectory: &Trajectory,
         directions: &[(f64, f64)],
         positions: Range<u64>,
-    ) -> (Vec<Option<Touch>>, Counters) {
+    ) -> (SubTrajectory, Counters) {
+        let Range { start, end } = positions;
         let poses = poses(trajectory, directions, positions);
+        let (mut touches, mut counters) = self.search_all(trajectory, poses);
+        let Some(tolerance) = self.path_tolerance else {
+            let chunk = SubTrajectory {
+                first: start,
+                touches,
+                between: Vec::new(),
+            };
+            return (chunk, counters);
+        };
+        // The last move ends at a position that is another's.
+        if end < trajectory.positions {
+            let (cos, sin) = directions[(end % directions.len() as u64) as usize];
+            let x = trajectory.travel(end);
+            let beyond = Probe {
+                pose: Pose { x, cos, sin },
+                near: [touches.last().copied().flatten(), None],
+            };
+            touches.extend(self.search_near(&[beyond], &mut counters));
+        }
+        let search = |probes: &[Probe]| self.search_near(probes, &mut counters);
+        let (between, beyond) = between::insert(trajectory, tolerance, start, &touches, search);
+        counters.beyond_tolerance += beyond;
+        touches.truncate((end - start) as usize);
+        let chunk = SubTrajectory {
+            first: start,
+            touches,
+            between,
+        };
+        (chunk, counters)
+    }
+
+    /// What is touched at consecutive positions.
+    fn search_all(
+        &self,
+        trajectory: &Trajectory,
+        poses: impl Iterator<Item = Pose>,
+    ) -> (Vec<Option<Touch>>, Counters) {
         let (cutter, revolution) = (&self.cutter, trajectory.points_per_revolution as usize);
         match &self.search {
             Search::Points(tree) => {
@@ -145,6 +194,27 @@ impl Digitizer {
             }),
         }
     }
+
+    /// What is touched between positions. Windows follow a winner from position to position, so that
+    /// the hierarchy, which they fall back on anyway, does it for them.
+    fn search_near(&self, probes: &[Probe], counters: &mut Counters) -> Vec<Option<Touch>> {
+        let cutter = &self.cutter;
+        let poses = probes.iter().map(|p| p.pose);
+        let (touches, cost) = match &self.search {
+            Search::Points(tree) | Search::Windows { tree, .. } => {
+                with_simd!(self.simd, simd => near(simd, cutter, tree, probes))
+            }
+            Search::Facets(tree) => {
+                with_simd!(self.simd, simd => near(simd, cutter, tree, probes))
+            }
+            Search::AllPoints(sweep) => {
+                with_simd!(self.simd, simd => sweep::run(simd, cutter, sweep, poses))
+            }
+            Search::AllFacets(facets) => facets.run(cutter, poses),
+        };
+        *counters += cost;
+        touches
+    }
 }
 
 /// The papers' search without a fallback: one chain of windows from the first position to the last.
@@ -161,20 +231,22 @@ impl Heuristic {
     /// Makes rows ready, and finds the exact path to hold the chains against. Runs on the current
     /// thread pool.
     pub fn new(job: &Job, local: Local, rows: &[Row], trajectory: &Trajectory, simd: Simd) -> Self {
+        // The chain is held against positions alone.
+        let motion = Motion {
+            path_tolerance: None,
+            ..job.motion
+        };
         let exact_job = Job {
             method: Method::Exact,
+            motion,
             ..*job
         };
         let positions = 0..trajectory.positions;
         let mut exact = Vec::new();
-        Digitizer::new(&exact_job, rows, simd).run_chunks(
-            trajectory,
-            positions.clone(),
-            |_, touches| {
-                exact.extend(touches);
-                true
-            },
-        );
+        Digitizer::new(&exact_job, rows, simd).run_chunks(trajectory, positions.clone(), |chunk| {
+            exact.extend(chunk.touches);
+            true
+        });
         Self {
             grids: Grids::new(rows, local.culling),
             cutter: job.cutter,
@@ -290,6 +362,35 @@ fn exact<S: Vectors, L: Leaf>(
             }
             touches.push(touch);
         }
+    }
+    (touches, counters)
+}
+
+/// The same for probes, each with what is touched beside it.
+#[inline(always)]
+fn near<S: Vectors, L: Leaf>(
+    simd: S,
+    cutter: &Cutter,
+    tree: &Tree<L>,
+    probes: &[Probe],
+) -> (Vec<Option<Touch>>, Counters) {
+    let mut counters = Counters::default();
+    let mut touches: Vec<Option<Touch>> = Vec::with_capacity(probes.len());
+    let mut place = [0.0; 2];
+    let mut starts = Vec::with_capacity(LANES);
+    for eight in probes.chunks(LANES) {
+        starts.clear();
+        for &Probe { pose, near } in eight {
+            let mut floor = f64::NEG_INFINITY;
+            for touch in near.iter().flatten() {
+                floor = floor.max(least_height(cutter, &pose, touch.contact));
+                let [d, _, z] = pose.face(touch.contact);
+                place = [d, z];
+            }
+            starts.push(Start { pose, floor, place });
+        }
+        let found = tree.search(simd, cutter, &starts, &mut counters);
+        touches.extend(found.iter().take(eight.len()).map(|best| best.touch()));
     }
     (touches, counters)
 }

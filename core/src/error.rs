@@ -1,5 +1,9 @@
 //! What the mathematics refuses, and why.
 
+use std::ops::Range;
+
+use crate::motion::Index;
+
 /// Everything that can be wrong with a part, a cutter or a motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -233,6 +237,31 @@ pub enum Error {
         /// Last position delivered again.
         last: u64,
     },
+    /// Stitching found an inserted position where it does not belong.
+    #[error(
+        "position {index} was inserted after {last}, on the moves from positions {} to {}", moves.start, moves.end.saturating_sub(1)
+    )]
+    Misplaced {
+        /// The inserted position.
+        index: Index,
+        /// The one before it.
+        last: Index,
+        /// Positions from which the moves begin that it may be on.
+        moves: Range<u64>,
+    },
+    /// More inserted positions than there is memory for.
+    #[error(
+        "the path tolerance takes more than {limit} positions between those of the motion, for which there is no memory; choose a larger path_tolerance"
+    )]
+    TooManyInserted {
+        /// Most that there is memory for.
+        limit: u64,
+    },
+    /// Heights between positions where only a chain through all positions gives them.
+    #[error(
+        "path_tolerance needs heights between positions, which the local search without its fallback does not have; leave the fallback on, or choose the exact search"
+    )]
+    PathToleranceNeedsFallback,
     /// Stitching found a position that the trajectory does not have.
     #[error("position {position} was delivered, but the path has only {positions}")]
     BeyondTheEnd {
@@ -251,6 +280,7 @@ impl Error {
             Self::OutOfMemory { .. }
                 | Self::ToleranceNotReached { .. }
                 | Self::TooManyPositions { .. }
+                | Self::TooManyInserted { .. }
                 | Self::TooManySamples { .. }
                 | Self::GridTooLarge { .. }
                 | Self::EmptyTravel { .. }

@@ -2,12 +2,13 @@
 //!
 //! Positions are cut by x into runs of equal predicted work; an extent needs every row that the
 //! cutter can reach from its positions. Both are decided here, once, whatever the distribution.
+//! Where positions are inserted an extent owns the moves that begin at its positions, and also needs
+//! what is in reach from the one that the last of them ends at.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::cutter::Cutter;
-use crate::job::Method;
+use crate::job::{Job, Method};
 use crate::motion::Trajectory;
 use crate::row::Outline;
 use crate::tolerance::REACH_SLACK;
@@ -65,14 +66,8 @@ impl Extent {
 const SAMPLES: u64 = 4096;
 
 /// Cuts the trajectory into at most `parts` extents of about equal predicted work, none empty.
-pub fn split(
-    trajectory: &Trajectory,
-    outlines: &[Outline],
-    cutter: &Cutter,
-    method: Method,
-    parts: u32,
-) -> Vec<Extent> {
-    let w = cutter.half_width() + REACH_SLACK;
+pub fn split(trajectory: &Trajectory, outlines: &[Outline], job: &Job, parts: u32) -> Vec<Extent> {
+    let w = job.cutter.half_width() + REACH_SLACK;
     let reach = Reach::new(outlines);
     let blocks = trajectory.positions.min(SAMPLES);
     let block =
@@ -86,7 +81,7 @@ pub fn split(
                 low: x - w,
                 high: x + w,
             });
-            total += (positions.end - positions.start) as f64 * predicted(method, candidates);
+            total += (positions.end - positions.start) as f64 * predicted(job.method, candidates);
             total
         })
         .collect();
@@ -105,13 +100,23 @@ pub fn split(
             id,
             first,
             count,
-            rows: rows_within(outlines, trajectory.travel_of(first, count).widened(w)),
+            rows: rows_within(outlines, seen(trajectory, job, first, count).widened(w)),
             ..Extent::default()
         }
     };
     let mut extents: Vec<Extent> = (0..).zip(cuts.windows(2)).map(extent).collect();
     give_to_owners(&mut extents, outlines, trajectory);
     extents
+}
+
+/// The travel of positions, and of the one that their last move ends at where positions are inserted.
+fn seen(trajectory: &Trajectory, job: &Job, first: u64, count: u64) -> Interval {
+    let end = first + count;
+    let end = match job.motion.path_tolerance {
+        Some(_) => trajectory.positions.min(end + 1),
+        None => end,
+    };
+    trajectory.travel_of(first, end - first)
 }
 
 /// Gives each row to that of the extents that need it to which its middle is nearest.
@@ -150,10 +155,10 @@ const WORTH_IT: f64 = 0.25;
 pub(crate) fn interior_first(
     trajectory: &Trajectory,
     outlines: &[Outline],
-    cutter: &Cutter,
+    job: &Job,
     extent: &Extent,
 ) -> Vec<Run> {
-    let w = cutter.half_width() + REACH_SLACK;
+    let w = job.cutter.half_width() + REACH_SLACK;
     let (begin, end) = (extent.first, extent.first + extent.count);
     // Positions from which each row of the halo is in reach; travel never decreases.
     let mut edges: Vec<(u64, u64)> = Vec::new();
@@ -163,7 +168,8 @@ pub(crate) fn interior_first(
         let x = strip.map_or(outlines[row as usize].x, |s| {
             s.hull(outlines[row as usize].x)
         });
-        let from = partition(begin, end, |i| trajectory.travel(i) + w < x.low);
+        let clear = |i| seen(trajectory, job, i, 1).high + w < x.low;
+        let from = partition(begin, end, clear);
         let to = partition(begin, end, |i| trajectory.travel(i) - w <= x.high);
         edges.push((from, to));
     }
@@ -180,9 +186,13 @@ pub(crate) fn interior_first(
         count: positions.end - positions.start,
         rows: rows_within(
             outlines,
-            trajectory
-                .travel_of(positions.start, positions.end - positions.start)
-                .widened(w),
+            seen(
+                trajectory,
+                job,
+                positions.start,
+                positions.end - positions.start,
+            )
+            .widened(w),
         ),
     };
     let inner = run(interior.clone());
@@ -276,8 +286,27 @@ impl Reach {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::MotionKind;
+    use crate::cutter::Cutter;
+    use crate::job::{Contact, Discretization};
+    use crate::motion::{Motion, MotionKind};
     use proptest::prelude::*;
+
+    fn job(radius: f64, path_tolerance: Option<f64>) -> Job {
+        Job {
+            discretization: Discretization::Tolerance(0.1),
+            cutter: Cutter::ball(radius).expect("valid"),
+            motion: Motion {
+                kind: MotionKind::Helix,
+                step: 3.0,
+                points_per_revolution: 40,
+                from: None,
+                to: None,
+                path_tolerance,
+            },
+            contact: Contact::Point,
+            method: Method::Exact,
+        }
+    }
 
     fn outlines() -> impl Strategy<Value = Vec<Outline>> {
         let row = (-10.0..110.0_f64, 0.0..20.0_f64, any::<bool>());
@@ -303,8 +332,8 @@ mod tests {
             positions in 1..5000_u64,
             parts in 1..20_u32,
             radius in 0.5..30.0_f64,
+            between in any::<bool>(),
         ) {
-            let cutter = Cutter::ball(radius).expect("valid");
             let trajectory = Trajectory {
                 kind: MotionKind::Helix,
                 from: -5.0,
@@ -312,14 +341,16 @@ mod tests {
                 points_per_revolution: 40,
                 positions,
             };
-            let extents = split(&trajectory, &outlines, &cutter, Method::Exact, parts);
+            let job = job(radius, between.then_some(0.01));
+            let extents = split(&trajectory, &outlines, &job, parts);
             prop_assert!(extents.len() <= parts as usize);
             let mut next = 0;
             for (i, e) in extents.iter().enumerate() {
                 prop_assert_eq!((e.id as usize, e.first), (i, next));
                 prop_assert!(e.count > 0);
                 next += e.count;
-                for index in [e.first, e.first + e.count - 1] {
+                let last = e.first + e.count - u64::from(!between || next == positions);
+                for index in [e.first, last] {
                     let x = trajectory.travel(index);
                     for (id, o) in (0u32..).zip(&outlines) {
                         if o.x.low <= x + radius && o.x.high >= x - radius {
@@ -338,8 +369,9 @@ mod tests {
             positions in 1..5000_u64,
             parts in 1..20_u32,
             radius in 0.5..30.0_f64,
+            between in any::<bool>(),
         ) {
-            let cutter = Cutter::ball(radius).expect("valid");
+            let job = job(radius, between.then_some(0.01));
             let trajectory = Trajectory {
                 kind: MotionKind::Rings,
                 from: -5.0,
@@ -347,7 +379,7 @@ mod tests {
                 points_per_revolution: 40,
                 positions,
             };
-            let extents = split(&trajectory, &outlines, &cutter, Method::Exact, parts);
+            let extents = split(&trajectory, &outlines, &job, parts);
             let sorted = |rows: &mut dyn Iterator<Item = u32>| {
                 let mut rows: Vec<u32> = rows.collect();
                 rows.sort_unstable();
@@ -365,7 +397,7 @@ mod tests {
                     prop_assert!(h.extent != e.id && !h.rows.is_empty());
                     prop_assert!(h.rows.iter().all(|r| owner.own.contains(r)));
                 }
-                let mut runs = interior_first(&trajectory, &outlines, &cutter, e);
+                let mut runs = interior_first(&trajectory, &outlines, &job, e);
                 if runs.len() > 1 {
                     prop_assert!(runs[0].rows.iter().all(|r| e.own.contains(r)));
                 }
@@ -375,8 +407,8 @@ mod tests {
                     prop_assert_eq!(run.first, next);
                     prop_assert!(run.count > 0);
                     next += run.count;
-                    let within = trajectory.travel_of(run.first, run.count);
-                    let within = within.widened(cutter.half_width() + REACH_SLACK);
+                    let within = seen(&trajectory, &job, run.first, run.count);
+                    let within = within.widened(job.cutter.half_width() + REACH_SLACK);
                     prop_assert_eq!(&run.rows, &rows_within(&outlines, within));
                     prop_assert!(run.rows.iter().all(|r| e.rows.contains(r)));
                 }
@@ -405,8 +437,7 @@ mod tests {
             points_per_revolution: 100,
             positions: 20_001,
         };
-        let cutter = Cutter::ball(1.0).expect("valid");
-        let halves = split(&trajectory, &outlines, &cutter, Method::Exact, 2);
+        let halves = split(&trajectory, &outlines, &job(1.0, None), 2);
         let cut = trajectory.travel(halves[1].first);
         assert!(
             (cut - 50.0).abs() < 2.0,

@@ -21,6 +21,25 @@ pub struct Job {
     pub method: Method,
 }
 
+impl Job {
+    /// Checks the numbers and that they fit together.
+    ///
+    /// # Errors
+    /// Those of [`Discretization::validate`], [`Motion::validate`] and [`Method::validate`];
+    /// [`crate::Error::PathToleranceNeedsFallback`].
+    pub fn validate(&self) -> Result<()> {
+        self.discretization.validate()?;
+        self.motion.validate()?;
+        self.method.validate(self.contact)?;
+        match self.method {
+            Method::Local(local) if !local.fallback && self.motion.path_tolerance.is_some() => {
+                Err(Error::PathToleranceNeedsFallback)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 /// How parametric surfaces become grids; meshes are taken as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Discretization {

@@ -43,6 +43,7 @@ mod tree;
 mod local;
 mod sweep;
 
+mod between;
 mod digitize;
 
 mod path;
@@ -58,9 +59,9 @@ pub use error::{Error, Result};
 pub use extent::{Extent, Halo, Run};
 pub use grid::SurfaceGrid;
 pub use job::{Contact, Culling, Discretization, Distribution, Job, Local, Method, Window};
-pub use motion::{Motion, MotionKind, Trajectory};
+pub use motion::{Index, Motion, MotionKind, Trajectory};
 pub use part::{Body, Mesh, Part, Shape};
-pub use path::{SubTrajectory, ToolPath, Touch, stitch};
+pub use path::{Inserted, SubTrajectory, ToolPath, Touch, Waypoint, stitch};
 pub use placement::{Axis, place};
 pub use plan::{Handout, Plan, Stock};
 pub use record::{BodyRecord, Counters, ExtentRecord, LostAttempt, Phase, Record};

@@ -1,7 +1,7 @@
 //! The tool path, and stitching it together from sub-trajectories.
 
 use crate::error::{Error, Result};
-use crate::motion::Trajectory;
+use crate::motion::{Index, Trajectory};
 use crate::vector::Point;
 use crate::verify::Position;
 
@@ -14,48 +14,129 @@ pub struct Touch {
     pub contact: Point,
 }
 
+/// A position inserted between two of the trajectory's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inserted {
+    /// Where: never whole.
+    pub index: Index,
+    /// Where the cutter touches, or `None` where nothing is in its reach.
+    pub touch: Option<Touch>,
+}
+
 /// A tool path: for each position of the trajectory where the cutter touches, or `None` where
-/// nothing is in its reach.
+/// nothing is in its reach, and what was inserted between.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ToolPath {
     /// Travel and angle of each position.
     pub trajectory: Trajectory,
     /// One for each position, in order.
     pub touches: Vec<Option<Touch>>,
+    /// Positions between those, in order.
+    pub between: Vec<Inserted>,
+}
+
+/// One position of a path, the trajectory's or inserted, with all that is known of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Waypoint {
+    /// Its name.
+    pub index: Index,
+    /// Travel along the spindle, mm.
+    pub x: f64,
+    /// Unwound angle, degrees.
+    pub angle: f64,
+    /// Where the cutter touches, or `None` where nothing is in its reach.
+    pub touch: Option<Touch>,
 }
 
 impl ToolPath {
+    /// All positions, in the order in which a machine takes them.
+    pub fn waypoints(&self) -> impl Iterator<Item = Waypoint> + '_ {
+        let whole = (0..).zip(&self.touches);
+        let mut whole = whole.map(|(i, &touch)| (Index::whole(i), touch)).peekable();
+        let mut between = self.between.iter().map(|b| (b.index, b.touch)).peekable();
+        std::iter::from_fn(move || {
+            let inserted = match (whole.peek(), between.peek()) {
+                (Some(w), Some(b)) => b.0 < w.0,
+                (w, _) => w.is_none(),
+            };
+            let next = if inserted {
+                between.next()
+            } else {
+                whole.next()
+            };
+            let (index, touch) = next?;
+            Some(Waypoint {
+                index,
+                x: self.trajectory.travel_at(index.floor(), index.share()),
+                angle: self.trajectory.angle_at(index.floor(), index.share()),
+                touch,
+            })
+        })
+    }
+
     /// The same path by the numbers a machine is given, for [`crate::verify()`].
     pub fn positions(&self) -> Vec<Position> {
-        let position = |(index, touch): (u64, &Option<Touch>)| Position {
-            x: self.trajectory.travel(index),
-            angle: self.trajectory.angle(index),
-            height: touch.map(|t| t.height),
+        let position = |w: Waypoint| Position {
+            x: w.x,
+            angle: w.angle,
+            height: w.touch.map(|t| t.height),
         };
-        (0..).zip(&self.touches).map(position).collect()
+        let mut positions = Vec::with_capacity(self.touches.len() + self.between.len());
+        positions.extend(self.waypoints().map(position));
+        positions
     }
 }
 
-/// A run of consecutive positions, digitized.
-#[derive(Debug, Clone, PartialEq)]
+/// A run of consecutive positions, digitized, with what was inserted on the moves that begin there.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct SubTrajectory {
     /// Index of the first position.
     pub first: u64,
     /// One for each position from there on.
     pub touches: Vec<Option<Touch>>,
+    /// Positions between those, and between the last and the one after it; in order.
+    pub between: Vec<Inserted>,
+}
+
+impl SubTrajectory {
+    /// Index of the position that comes after it.
+    pub fn end(&self) -> u64 {
+        self.first + self.touches.len() as u64
+    }
+
+    /// Checks that what was inserted lies on its own moves, of a trajectory of so many positions, in
+    /// order and once.
+    ///
+    /// # Errors
+    /// [`Error::Misplaced`]
+    pub fn validate(&self, positions: u64) -> Result<()> {
+        // From the last position of all there is no move.
+        let moves = self.first..self.end().min(positions.saturating_sub(1));
+        let mut last = Index::whole(self.first);
+        for inserted in &self.between {
+            let index = inserted.index;
+            if !moves.contains(&index.floor()) || index <= last || index.parts() == 0 {
+                return Err(Error::Misplaced { index, last, moves });
+            }
+            last = index;
+        }
+        Ok(())
+    }
 }
 
 /// Joins sub-trajectories, in any order, into a path.
 ///
 /// # Errors
 /// [`Error::Gap`] or [`Error::Duplicate`] unless every position comes exactly once, and
-/// [`Error::BeyondTheEnd`] if there is one that the trajectory does not have.
+/// [`Error::BeyondTheEnd`] if there is one that the trajectory does not have; those of
+/// [`SubTrajectory::validate`].
 pub fn stitch(trajectory: Trajectory, mut parts: Vec<SubTrajectory>) -> Result<ToolPath> {
     parts.sort_by_key(|p| (p.first, p.touches.len()));
     let mut touches = Vec::with_capacity(parts.iter().map(|p| p.touches.len()).sum());
+    let mut between = Vec::with_capacity(parts.iter().map(|p| p.between.len()).sum());
     for part in parts {
         let next = touches.len() as u64;
-        let end = part.first + part.touches.len() as u64;
+        let end = part.end();
         if end > trajectory.positions {
             return Err(Error::BeyondTheEnd {
                 position: end - 1,
@@ -74,7 +155,9 @@ pub fn stitch(trajectory: Trajectory, mut parts: Vec<SubTrajectory>) -> Result<T
                 last: next.min(end) - 1,
             });
         }
+        part.validate(trajectory.positions)?;
         touches.extend(part.touches);
+        between.extend(part.between);
     }
     let next = touches.len() as u64;
     if next < trajectory.positions {
@@ -86,6 +169,7 @@ pub fn stitch(trajectory: Trajectory, mut parts: Vec<SubTrajectory>) -> Result<T
     Ok(ToolPath {
         trajectory,
         touches,
+        between,
     })
 }
 
@@ -94,19 +178,68 @@ mod tests {
     use super::*;
     use crate::motion::MotionKind;
 
+    const TRAJECTORY: Trajectory = Trajectory {
+        kind: MotionKind::Helix,
+        from: 0.0,
+        step: 1.0,
+        points_per_revolution: 4,
+        positions: 10,
+    };
+
     fn check(parts: &[(u64, usize)]) -> Result<usize> {
-        let trajectory = Trajectory {
-            kind: MotionKind::Helix,
-            from: 0.0,
-            step: 1.0,
-            points_per_revolution: 4,
-            positions: 10,
-        };
         let parts = parts.iter().map(|&(first, count)| SubTrajectory {
             first,
             touches: vec![None; count],
+            between: Vec::new(),
         });
-        stitch(trajectory, parts.collect()).map(|p| p.touches.len())
+        stitch(TRAJECTORY, parts.collect()).map(|p| p.touches.len())
+    }
+
+    /// A run of positions with some inserted, each as the whole index and parts.
+    fn run(first: u64, count: usize, between: &[(u64, u16)]) -> SubTrajectory {
+        let inserted = |&(whole, parts)| Inserted {
+            index: Index::between(whole, parts).expect("between"),
+            touch: None,
+        };
+        SubTrajectory {
+            first,
+            touches: vec![None; count],
+            between: between.iter().map(inserted).collect(),
+        }
+    }
+
+    #[test]
+    fn what_was_inserted_comes_in_its_place() {
+        let parts = vec![
+            run(4, 6, &[(4, 1), (8, 512)]),
+            run(0, 4, &[(0, 512), (0, 768), (3, 256)]),
+        ];
+        let path = stitch(TRAJECTORY, parts).expect("whole");
+        let names: Vec<String> = path.waypoints().map(|w| w.index.to_string()).collect();
+        let expected = "0 0.5 0.75 1 2 3 3.25 4 4.0009765625 5 6 7 8 8.5 9";
+        assert_eq!(names.join(" "), expected);
+        let positions = path.positions();
+        assert!(positions.is_sorted_by(|a, b| a.x < b.x && a.angle < b.angle));
+        assert_eq!((positions[2].x, positions[2].angle), (0.1875, 67.5));
+    }
+
+    #[test]
+    fn what_was_inserted_must_lie_on_its_own_moves_in_order_and_once() {
+        for between in [
+            &[(4, 1), (4, 1)][..],
+            &[(4, 2), (4, 1)],
+            &[(5, 1), (4, 1)],
+            &[(3, 1023)],
+            &[(10, 1)],
+            &[(9, 1)],
+        ] {
+            let parts = vec![run(0, 4, &[]), run(4, 6, between)];
+            let stitched = stitch(TRAJECTORY, parts);
+            assert!(
+                matches!(stitched, Err(Error::Misplaced { .. })),
+                "{between:?}"
+            );
+        }
     }
 
     #[test]

@@ -20,10 +20,16 @@ pub struct Plan {
     pub model: Model,
     /// The positions.
     pub trajectory: Trajectory,
+    /// How many positions may be inserted between them: as many as there is memory for; none if the
+    /// job does not ask for any.
+    pub most_inserted: u64,
 }
 
 /// Memory for each position: its touch while it is collected, stitched and written.
 const POSITION_BYTES: f64 = 160.0;
+
+/// Memory for each inserted position: the same, and what [`crate::verify()`] takes.
+const INSERTED_BYTES: f64 = 400.0;
 
 /// Memory for each point of a grid: in its row, in the hierarchy, and its two facets.
 const POINT_BYTES: f64 = 320.0;
@@ -35,13 +41,23 @@ impl Plan {
     /// [`Error::OutOfMemory`] before anything large is tried; those of [`crate::discretize()`] and of
     /// [`crate::Motion::over`].
     pub fn new(part: &Part, job: Job, memory: u64) -> Result<Self> {
-        let model = fill(&lay_out(part, &job, memory, POINT_BYTES)?);
+        let (layout, needed) = lay_out(part, &job, memory, POINT_BYTES)?;
+        let model = fill(&layout);
         let trajectory = positions(&job, &model.outlines)?;
         Ok(Self {
             job,
             model,
             trajectory,
+            most_inserted: most_inserted(&job, memory as f64 - needed),
         })
+    }
+
+    /// Whether so many inserted positions can be kept.
+    ///
+    /// # Errors
+    /// [`Error::TooManyInserted`]
+    pub fn check_inserted(&self, inserted: u64) -> Result<()> {
+        check_inserted(inserted, self.most_inserted)
     }
 
     /// Cuts the positions into at most `parts` extents of about equal predicted work.
@@ -50,8 +66,9 @@ impl Plan {
             job,
             model,
             trajectory,
+            ..
         } = self;
-        split(trajectory, &model.outlines, &job.cutter, job.method, parts)
+        split(trajectory, &model.outlines, job, parts)
     }
 }
 
@@ -70,6 +87,8 @@ pub struct Handout {
     pub bodies: Vec<BodyRecord>,
     /// What rows are sent from.
     pub stock: Stock,
+    /// How many positions may be inserted between them, as in [`Plan`].
+    pub most_inserted: u64,
 }
 
 /// What a master has of the rows.
@@ -98,13 +117,15 @@ impl Handout {
                     outlines: plan.model.outlines,
                     bodies: plan.model.bodies,
                     stock: Stock::Rows(plan.model.rows),
+                    most_inserted: plan.most_inserted,
                 })
             }
             Distribution::Surface => {
                 if let Some(name) = mesh(part) {
                     return Err(Error::SurfaceNeedsSurfaces { name });
                 }
-                let survey = survey(&lay_out(part, &job, memory, 0.0)?, drop);
+                let (layout, needed) = lay_out(part, &job, memory, 0.0)?;
+                let survey = survey(&layout, drop);
                 Ok(Self {
                     job,
                     distribution,
@@ -112,6 +133,7 @@ impl Handout {
                     outlines: survey.outlines,
                     bodies: survey.bodies,
                     stock: Stock::Grids(survey.grids),
+                    most_inserted: most_inserted(&job, memory as f64 - needed),
                 })
             }
         }
@@ -119,8 +141,15 @@ impl Handout {
 
     /// Cuts the positions into at most `parts` extents of about equal predicted work.
     pub fn split(&self, parts: u32) -> Vec<Extent> {
-        let (job, outlines) = (&self.job, &self.outlines);
-        split(&self.trajectory, outlines, &job.cutter, job.method, parts)
+        split(&self.trajectory, &self.outlines, &self.job, parts)
+    }
+
+    /// Whether so many inserted positions can be kept.
+    ///
+    /// # Errors
+    /// [`Error::TooManyInserted`]
+    pub fn check_inserted(&self, inserted: u64) -> Result<()> {
+        check_inserted(inserted, self.most_inserted)
     }
 
     /// The runs in which a worker digitizes an extent: what needs only the extent's own rows first, if
@@ -129,24 +158,37 @@ impl Handout {
         match self.distribution {
             Distribution::Overlap | Distribution::Surface => vec![extent.whole()],
             Distribution::Halo => {
-                interior_first(&self.trajectory, &self.outlines, &self.job.cutter, extent)
+                interior_first(&self.trajectory, &self.outlines, &self.job, extent)
             }
         }
     }
 }
 
+/// How many positions may be inserted if so many bytes are left.
+fn most_inserted(job: &Job, left: f64) -> u64 {
+    match job.motion.path_tolerance {
+        Some(_) => (left / INSERTED_BYTES) as u64,
+        None => 0,
+    }
+}
+
+fn check_inserted(inserted: u64, limit: u64) -> Result<()> {
+    if inserted > limit {
+        return Err(Error::TooManyInserted { limit });
+    }
+    Ok(())
+}
+
 /// Checks a job, that it fits its part, and that it fits into `memory` bytes, each point taking
-/// `point_bytes` of them; decides on the lines of every grid.
+/// `point_bytes` of them; decides on the lines of every grid. Also tells how many bytes it takes.
 fn lay_out<'a>(
     part: &'a Part,
     job: &Job,
     memory: u64,
     point_bytes: f64,
-) -> Result<Vec<Layout<'a>>> {
+) -> Result<(Vec<Layout<'a>>, f64)> {
     part.validate()?;
-    job.motion.validate()?;
-    job.discretization.validate()?;
-    job.method.validate(job.contact)?;
+    job.validate()?;
     if let Method::Local(_) = job.method
         && let Some(name) = mesh(part)
     {
@@ -157,8 +199,8 @@ fn lay_out<'a>(
     let check = |points| check_memory(points, point_bytes, upper.positions, memory);
     check(points(part, job.discretization))?;
     let layout = layout(part, job.discretization)?;
-    check(layout.iter().map(Layout::points).sum())?;
-    Ok(layout)
+    let needed = check(layout.iter().map(Layout::points).sum())?;
+    Ok((layout, needed))
 }
 
 /// The positions over rows of these outlines.
@@ -198,7 +240,7 @@ fn points(part: &Part, discretization: Discretization) -> f64 {
     points.sum()
 }
 
-fn check_memory(points: f64, point_bytes: f64, positions: u64, available: u64) -> Result<()> {
+fn check_memory(points: f64, point_bytes: f64, positions: u64, available: u64) -> Result<f64> {
     let needed = points * point_bytes + positions as f64 * POSITION_BYTES;
     if needed > available as f64 {
         return Err(Error::OutOfMemory {
@@ -208,5 +250,5 @@ fn check_memory(points: f64, point_bytes: f64, positions: u64, available: u64) -
             available,
         });
     }
-    Ok(())
+    Ok(needed)
 }

@@ -66,6 +66,9 @@ pub struct Counters {
     pub lost: u64,
     /// By how much its height was too low there, at most, mm.
     pub largest_loss: f64,
+    /// Straight moves that stray farther than the path tolerance and are too short to insert into:
+    /// there the height jumps.
+    pub beyond_tolerance: u64,
 }
 
 impl Counters {
@@ -82,6 +85,7 @@ impl std::ops::AddAssign for Counters {
         self.nodes += other.nodes;
         self.lost += other.lost;
         self.largest_loss = self.largest_loss.max(other.largest_loss);
+        self.beyond_tolerance += other.beyond_tolerance;
     }
 }
 

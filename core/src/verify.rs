@@ -106,7 +106,8 @@ pub struct Gouge {
     pub depth: f64,
     /// The sample, in part coordinates, mm.
     pub point: Point,
-    /// Index of the position, or of the one from which the move departs.
+    /// Which of the path's positions it is, or from which of them the move departs, from 0; inserted
+    /// ones are counted too.
     pub position: u64,
     /// Travel at which it happens, mm.
     pub x: f64,

@@ -29,6 +29,27 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig {
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(seed()),
+        max_shrink_iters: 4000,
+        ..ProptestConfig::with_cases(CASES / 4)
+    })]
+
+    #[test]
+    fn what_is_inserted_is_the_same_whoever_looks(
+        bytes in prop::collection::vec(any::<u8>(), 0..BYTES),
+        tolerance in prop::sample::select(vec![1.0, 0.05, 0.003]),
+    ) {
+        if let Some(mut case) = Case::from_bytes(&bytes) {
+            let step = case.job.motion.step;
+            case.job.motion.path_tolerance = Some((tolerance * step).max(1.0e-6));
+            case.check().map_err(|e| TestCaseError::fail(format!("{e}\n{case:?}")))?;
+        }
+    }
+}
+
 const CASES: u32 = 2000;
 
 /// The same cases each time, unless others are asked for with `HORMA_SEED`.
@@ -101,6 +122,7 @@ fn a_lid_that_bends_outward_is_not_skipped_where_the_cutter_is_level() {
                     points_per_revolution: 7,
                     from: None,
                     to: None,
+                    path_tolerance: None,
                 },
                 contact: Contact::Facet,
                 method: Method::Exact,
@@ -108,5 +130,20 @@ fn a_lid_that_bends_outward_is_not_skipped_where_the_cutter_is_level() {
             extents: 1,
         };
         assert_eq!(case.check().err(), None, "step {step}");
+    }
+}
+
+/// Where a wheel's very rim meets an edge, its height was estimated by a formula that is rounded
+/// otherwise than the height itself, and the edge given up although it was higher.
+#[test]
+fn an_edge_at_the_rim_is_not_given_up() {
+    let bytes = [
+        54, 244, 0, 41, 0, 0, 37, 0, 72, 153, 18, 0, 25, 0, 116, 199, 22, 0, 0, 0, 55, 10, 0, 0,
+        201, 103, 0, 0, 0, 20,
+    ];
+    let mut case = Case::from_bytes(&bytes).expect("within bounds");
+    for points in [4, 16] {
+        case.job.motion.points_per_revolution = points;
+        assert_eq!(case.check().err(), None, "{points} points");
     }
 }

@@ -53,6 +53,7 @@ fn plan(method: Method) -> Plan {
             points_per_revolution: 72,
             from: Some(0.0),
             to: Some(100.0),
+            path_tolerance: None,
         },
         contact: Contact::Point,
         method,
@@ -65,8 +66,8 @@ fn run(method: Method) -> (Vec<Option<Touch>>, Counters) {
     let digitizer = Digitizer::new(&plan.job, &plan.model.rows, Simd::best());
     let mut touches = Vec::new();
     let all = 0..plan.trajectory.positions;
-    let counters = digitizer.run_chunks(&plan.trajectory, all, |_, chunk| {
-        touches.extend(chunk);
+    let counters = digitizer.run_chunks(&plan.trajectory, all, |chunk| {
+        touches.extend(chunk.touches);
         true
     });
     (touches, counters)
@@ -158,4 +159,31 @@ fn culling_evaluates_fewer_points() {
     );
     assert!(evaluations(false, true) < all / 4, "the cutter is narrow");
     assert!(evaluations(true, true) < evaluations(false, true));
+}
+
+#[test]
+fn between_positions_windows_with_the_fallback_are_as_good_as_any() {
+    let between = |method| {
+        let mut plan = plan(method);
+        plan.job.motion.path_tolerance = Some(0.01);
+        let digitizer = Digitizer::new(&plan.job, &plan.model.rows, Simd::best());
+        let mut parts = Vec::new();
+        let all = 0..plan.trajectory.positions;
+        digitizer.run_chunks(&plan.trajectory, all, |run| {
+            parts.push(run);
+            true
+        });
+        parts
+    };
+    let exact = between(Method::Exact);
+    assert!(exact.iter().map(|r| r.between.len()).sum::<usize>() > 1000);
+    let tiny = Window {
+        delta_u: 2,
+        delta_v: 2,
+    };
+    assert_eq!(between(Method::Brute), exact);
+    assert_eq!(
+        between(Method::Local(local(tiny, Culling::default()))),
+        exact
+    );
 }

@@ -1,12 +1,15 @@
 //! `path.csv`: one line a position, numbers in the shortest form that reads back to the same bits.
 //!
+//! The index of a position that was inserted between two others has a fraction: 17.25 is a quarter of
+//! the way from position 17 to 18.
+//!
 //! Two runs of the same job give the same bytes, so the file is compared with `cmp`. It does not
 //! describe the job; that is the report's.
 
 use std::io::{self, Write};
 use std::path::Path;
 
-use horma_core::{Point, ToolPath, Touch};
+use horma_core::{Index, Point, ToolPath, Touch, Waypoint};
 
 use crate::decimal::integer;
 use crate::error::{Error, Result};
@@ -22,7 +25,7 @@ const CHUNK: usize = 1 << 16;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
     /// Index of the position.
-    pub index: u64,
+    pub index: Index,
     /// Travel along the spindle, mm.
     pub x: f64,
     /// Unwound angle, degrees.
@@ -49,15 +52,22 @@ pub fn write(path: &ToolPath, out: &mut impl Write) -> io::Result<()> {
     let mut text = Vec::with_capacity(CHUNK + 256);
     text.extend_from_slice(HEADER.as_bytes());
     text.push(b'\n');
-    for (index, touch) in (0u64..).zip(&path.touches) {
-        let x = path.trajectory.travel(index);
-        let angle = path.trajectory.angle(index);
-        integer(&mut text, index);
+    for Waypoint {
+        index,
+        x,
+        angle,
+        touch,
+    } in path.waypoints()
+    {
+        integer(&mut text, index.floor());
+        if index.parts() > 0 {
+            fraction(&mut text, index);
+        }
         number(&mut text, x);
         number(&mut text, angle);
         match touch {
             Some(Touch { height, contact }) => {
-                number(&mut text, *height);
+                number(&mut text, height);
                 contact.iter().for_each(|&c| number(&mut text, c));
             }
             None => text.extend_from_slice(b",,,,"),
@@ -69,6 +79,17 @@ pub fn write(path: &ToolPath, out: &mut impl Write) -> io::Result<()> {
         }
     }
     out.write_all(&text)
+}
+
+/// The fraction of an index, which its digits give exactly.
+fn fraction(text: &mut Vec<u8>, index: Index) {
+    let mut rest = u32::from(index.parts());
+    text.push(b'.');
+    while rest > 0 {
+        rest *= 10;
+        text.push(b'0' + (rest / u32::from(Index::PARTS)) as u8);
+        rest %= u32::from(Index::PARTS);
+    }
 }
 
 /// A comma and the shortest text that reads back to `value`, without exponent or negative zero.
@@ -118,17 +139,43 @@ pub fn read(file: &Path) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for (number, line) in lines {
         let row = parse(line).ok_or_else(|| bad(number, SHAPE, line))?;
-        if row.index != rows.len() as u64 {
-            return Err(bad(number, "the index that follows the line before", line));
+        if !follows(row.index, rows.last()) {
+            return Err(bad(number, "an index that follows the line before", line));
         }
         rows.push(row);
     }
     Ok(rows)
 }
 
+/// Whether an index comes after that of the row before: the next whole one, or one between.
+fn follows(index: Index, before: Option<&Row>) -> bool {
+    let Some(before) = before.map(|b| b.index) else {
+        return index == Index::whole(0);
+    };
+    if index.parts() == 0 {
+        index.floor() == before.floor() + 1
+    } else {
+        index.floor() == before.floor() && index > before
+    }
+}
+
+/// The index that a text stands for.
+fn index_of(text: &str) -> Option<Index> {
+    let (whole, parts) = match text.split_once('.') {
+        None => return text.parse().ok().map(Index::whole),
+        Some((whole, digits)) if digits.bytes().all(|b| b.is_ascii_digit()) => {
+            let share: f64 = format!("0.{digits}").parse().ok()?;
+            (whole.parse().ok()?, share * f64::from(Index::PARTS))
+        }
+        Some(_) => return None,
+    };
+    let exact = parts.fract() == 0.0;
+    exact.then(|| Index::between(whole, parts as u16))?
+}
+
 /// What a line is, for the message.
-const SHAPE: &str =
-    "an index and six numbers, of which y may be empty and the last three too, but only together";
+const SHAPE: &str = "an index, whole or with a fraction of 1024ths, and six numbers, of which y may be empty and the \
+    last three too, but only together";
 
 fn parse(line: &str) -> Option<Row> {
     let (index, rest) = line.split_once(',')?;
@@ -151,7 +198,7 @@ fn parse(line: &str) -> Option<Row> {
         Some([x?, y?, z?])
     };
     Some(Row {
-        index: index.parse().ok()?,
+        index: index_of(index)?,
         x: value(x)?,
         angle: value(angle)?,
         height,
@@ -161,7 +208,7 @@ fn parse(line: &str) -> Option<Row> {
 
 #[cfg(test)]
 mod tests {
-    use horma_core::{MotionKind, Trajectory};
+    use horma_core::{Inserted, MotionKind, Trajectory};
 
     use super::*;
 
@@ -186,6 +233,52 @@ mod tests {
                 }),
                 None,
             ],
+            between: Vec::new(),
+        }
+    }
+
+    /// The same with positions inserted.
+    fn finer() -> ToolPath {
+        let inserted = |(whole, parts, height)| Inserted {
+            index: Index::between(whole, parts).expect("between"),
+            touch: Some(Touch {
+                height,
+                contact: [1.0, 2.0, 3.0],
+            }),
+        };
+        ToolPath {
+            between: [(0, 1, 70.0), (0, 512, 60.0), (2, 256, 50.0)]
+                .map(inserted)
+                .to_vec(),
+            ..path()
+        }
+    }
+
+    #[test]
+    fn inserted_positions_have_an_index_with_a_fraction() {
+        let expected = "\
+index,x,angle,y,contact_x,contact_y,contact_z
+0,-0.2,0,78.5,0,0.3333333333333333,0.0000001
+0.0009765625,-0.19990234375,0.087890625,70,1,2,3
+0.5,-0.15000000000000002,45,60,1,2,3
+1,-0.1,90,,,,
+2,0,180,0.30000000000000004,10000000000000000,-2,0
+2.25,0.024999999999999994,202.5,50,1,2,3
+3,0.10000000000000003,270,,,,
+";
+        assert_eq!(text(&finer()), expected);
+        assert_eq!(index_of("17.25"), Index::between(17, 256));
+        for bad in [
+            "1.",
+            "1.0",
+            ".5",
+            "1.3",
+            "1.5e0",
+            "1.00048828125",
+            "-1.5",
+            "1.-5",
+        ] {
+            assert_eq!(index_of(bad), None, "{bad}");
         }
     }
 
@@ -229,15 +322,17 @@ index,x,angle,y,contact_x,contact_y,contact_z
     fn what_is_written_reads_back() {
         let dir = tempfile::tempdir().expect("scratch");
         let file = dir.path().join("path.csv");
-        let path = path();
-        save(&file, &path).expect("writable");
-        let rows = read(&file).expect("own format");
-        assert_eq!(rows.len(), 4);
-        for (row, touch) in rows.iter().zip(&path.touches) {
-            assert_eq!(row.height, touch.map(|t| t.height));
-            assert_eq!(row.contact, touch.map(|t| t.contact));
-            assert_eq!(row.x, path.trajectory.travel(row.index));
-            assert_eq!(row.angle, path.trajectory.angle(row.index));
+        for path in [path(), finer()] {
+            save(&file, &path).expect("writable");
+            let rows = read(&file).expect("own format");
+            let row = |w: Waypoint| Row {
+                index: w.index,
+                x: w.x,
+                angle: w.angle,
+                height: w.touch.map(|t| t.height),
+                contact: w.touch.map(|t| t.contact),
+            };
+            assert_eq!(rows, path.waypoints().map(row).collect::<Vec<_>>());
         }
     }
 
@@ -251,6 +346,8 @@ index,x,angle,y,contact_x,contact_y,contact_z
             (good.replacen("78.5", "", 1), ":2:"),
             (good.replacen("78.5", "NaN", 1), ":2:"),
             (good.replacen("1,-0.1", "3,-0.1", 1), ":3:"),
+            (good.replacen("1,-0.1", "1.5,-0.1", 1), ":3:"),
+            (good.replacen("0,-0.2", "0.5,-0.2", 1), ":2:"),
             (good.replacen(",,,,", ",,,", 1), ":3:"),
             (good.replacen(",,,,", ",,,,,", 1), ":3:"),
             (good.replacen("180", "18O", 1), ":4:"),

@@ -8,7 +8,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use horma_core::{ToolPath, Touch};
+use horma_core::{ToolPath, Touch, Waypoint};
 
 use crate::decimal::fixed;
 use crate::error::{Error, Result};
@@ -53,7 +53,8 @@ const CHUNK: usize = 1 << 16;
 /// [`Error::NoContact`] if the cutter never touches the part, [`Error::Io`] if the file cannot be
 /// written.
 pub fn save(file: &Path, path: &ToolPath, program: Program, heading: &Heading) -> Result<()> {
-    let stations = bridged(&path.touches).ok_or(Error::NoContact {
+    let touches: Vec<_> = path.waypoints().map(|w| w.touch).collect();
+    let stations = bridged(&touches).ok_or(Error::NoContact {
         positions: path.trajectory.positions,
     })?;
     output::write(file, |out| write(path, &stations, program, heading, out))
@@ -116,9 +117,7 @@ fn write(
     line(&mut text, "G0", &[(b'Y', safe)]);
 
     let mut last = None;
-    for (index, station) in (0u64..).zip(stations) {
-        let x = path.trajectory.travel(index);
-        let angle = path.trajectory.angle(index);
+    for (Waypoint { x, angle, .. }, station) in path.waypoints().zip(stations) {
         match last {
             None => {
                 line(&mut text, "G0", &[(b'X', x), (b'A', angle)]);
@@ -198,7 +197,7 @@ fn word(text: &mut Vec<u8>, letter: u8, value: f64, decimals: usize) {
 
 #[cfg(test)]
 mod tests {
-    use horma_core::{MotionKind, Trajectory};
+    use horma_core::{Index, Inserted, MotionKind, Trajectory};
 
     use super::*;
 
@@ -224,12 +223,14 @@ mod tests {
                 positions: heights.len() as u64,
             },
             touches: heights.iter().map(touch).collect(),
+            between: Vec::new(),
         }
     }
 
     fn text(path: &ToolPath, heading: &Heading) -> String {
         let mut out = Vec::new();
-        let stations = bridged(&path.touches).expect("contact");
+        let touches: Vec<_> = path.waypoints().map(|w| w.touch).collect();
+        let stations = bridged(&touches).expect("contact");
         write(path, &stations, PROGRAM, heading, &mut out).expect("memory");
         String::from_utf8(out).expect("ASCII")
     }
@@ -258,6 +259,22 @@ M2
 %
 ";
         assert_eq!(text(&path, &[("part", "last.step")]), expected);
+    }
+
+    #[test]
+    fn inserted_positions_are_moved_to_in_their_turn() {
+        let mut path = path(&[Some(50.0), Some(60.0)]);
+        path.between = vec![Inserted {
+            index: Index::between(0, 768).expect("between"),
+            touch: Some(Touch {
+                height: 52.5,
+                contact: [0.0, 6.0, 8.0],
+            }),
+        }];
+        let text = text(&path, &[]);
+        let moves: Vec<&str> = text.lines().filter(|l| l.starts_with("G1 X")).collect();
+        assert!(moves[0].starts_with("G1 X-0.25 Y52.5 A67.5 F"), "{text}");
+        assert!(moves[1].starts_with("G1 X0 Y60 A90 F"), "{text}");
     }
 
     #[test]

@@ -91,6 +91,8 @@ pub struct Overrides {
     pub from: Option<f64>,
     /// `motion.to`, mm
     pub to: Option<f64>,
+    /// `motion.path_tolerance`, mm
+    pub path_tolerance: Option<f64>,
     /// `program.feed`, mm/min
     pub feed: Option<f64>,
     /// `program.clearance`, mm
@@ -126,8 +128,7 @@ pub fn parse(text: &str, path: &Path, overrides: &Overrides) -> Result<JobFile> 
         contact,
         method,
     };
-    let checked = job.discretization.validate().and(job.motion.validate());
-    checked.map_err(|e| source.core(&raw, e))?;
+    job.validate().map_err(|e| source.core(&raw, e))?;
     let cluster = source.cluster(&raw)?;
     source.in_one_process(&raw, method, cluster.workers)?;
     Ok(JobFile {
@@ -303,6 +304,7 @@ impl Source<'_> {
             points_per_revolution: points.transpose()?.unwrap_or_default(),
             from: motion.from.as_ref().map(|g| g.value),
             to: motion.to.as_ref().map(|g| g.value),
+            path_tolerance: motion.path_tolerance.as_ref().map(|g| g.value),
         })
     }
 
@@ -409,6 +411,7 @@ impl Source<'_> {
             horma_core::Error::ConeTooSteep { .. } => "half_angle",
             horma_core::Error::EmptyTravel { .. } => "to",
             horma_core::Error::LocalNeedsPoints => "method",
+            horma_core::Error::PathToleranceNeedsFallback => "path_tolerance",
             _ => return Error::Core(error),
         };
         self.wrong(raw.at(key), error.to_string())

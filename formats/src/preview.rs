@@ -8,7 +8,7 @@ mod sheet;
 use std::io::Write;
 use std::path::Path;
 
-use horma_core::{Part, Point, ToolPath, Touch};
+use horma_core::{Part, Point, ToolPath, Waypoint};
 
 use crate::error::Result;
 use crate::output;
@@ -26,8 +26,8 @@ pub const CENTRE: Colour = [206, 112, 76];
 /// # Errors
 /// [`crate::Error::Io`], naming `file`.
 pub fn save(file: &Path, part: &Part, path: &ToolPath) -> Result<()> {
-    let touches = || path.touches.iter();
-    let contact: Vec<_> = touches().map(|t| t.map(|t| t.contact)).collect();
+    let touches = path.waypoints().map(|w| w.touch);
+    let contact: Vec<_> = touches.map(|t| t.map(|t| t.contact)).collect();
     let centre = centres(path);
     let lines = [
         Polyline {
@@ -47,17 +47,19 @@ pub fn save(file: &Path, part: &Part, path: &ToolPath) -> Result<()> {
 
 /// The tool centre at each position as the part sees it: the cutter turns about the part.
 fn centres(path: &ToolPath) -> Vec<Option<Point>> {
-    let turns = path.trajectory.directions().into_iter().cycle();
-    let centre = |((index, touch), (cos, sin)): ((u64, &Option<Touch>), (f64, f64))| {
-        let height = touch.as_ref()?.height;
-        Some([path.trajectory.travel(index), height * cos, -height * sin])
+    let centre = |Waypoint {
+                      index, x, touch, ..
+                  }: Waypoint| {
+        let height = touch?.height;
+        let (cos, sin) = path.trajectory.direction_at(index.floor(), index.share());
+        Some([x, height * cos, -height * sin])
     };
-    (0..).zip(&path.touches).zip(turns).map(centre).collect()
+    path.waypoints().map(centre).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use horma_core::{Body, Interval, Mesh, Motion, MotionKind, Shape};
+    use horma_core::{Body, Interval, Mesh, Motion, MotionKind, Shape, Touch};
 
     use super::*;
 
@@ -77,6 +79,7 @@ mod tests {
             points_per_revolution: 4,
             from: Some(0.0),
             to: Some(10.0),
+            path_tolerance: None,
         };
         let extent = Interval {
             low: 0.0,
@@ -92,6 +95,7 @@ mod tests {
         let path = ToolPath {
             trajectory,
             touches,
+            between: Vec::new(),
         };
 
         let centres = centres(&path);

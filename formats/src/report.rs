@@ -5,7 +5,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use horma_core::{Record, ToolPath, Verification};
+use horma_core::{Counters, Record, ToolPath, Verification};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -35,6 +35,10 @@ pub struct Report {
 pub struct PathStatistics {
     /// Number of positions.
     pub positions: u64,
+    /// Of these, those that were inserted between others.
+    pub inserted: u64,
+    /// Straight moves that stray farther than the path tolerance and are too short to insert into.
+    pub beyond_tolerance: u64,
     /// Positions where the cutter touches the part.
     pub with_contact: u64,
     /// Positions where nothing is in its reach.
@@ -46,13 +50,16 @@ pub struct PathStatistics {
 }
 
 impl PathStatistics {
-    /// Counts over a path.
-    pub fn of(path: &ToolPath) -> Self {
-        let heights = || path.touches.iter().flatten().map(|t| t.height);
-        let positions = path.touches.len() as u64;
+    /// Counts over a path, and what its search counted.
+    pub fn of(path: &ToolPath, counters: &Counters) -> Self {
+        let heights = || path.waypoints().filter_map(|w| w.touch).map(|t| t.height);
+        let inserted = path.between.len() as u64;
+        let positions = path.touches.len() as u64 + inserted;
         let with_contact = heights().count() as u64;
         Self {
             positions,
+            inserted,
+            beyond_tolerance: counters.beyond_tolerance,
             with_contact,
             without_contact: positions - with_contact,
             lowest: heights().reduce(f64::min),
@@ -74,7 +81,7 @@ pub fn save(file: &Path, report: &Report) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use horma_core::{LostAttempt, MotionKind, Phase, Touch, Trajectory};
+    use horma_core::{Index, Inserted, LostAttempt, MotionKind, Phase, Touch, Trajectory};
 
     use super::*;
 
@@ -92,19 +99,34 @@ mod tests {
                 positions: 3,
             },
             touches: vec![Some(touch(2.5)), None, Some(touch(-1.0))],
+            between: Vec::new(),
         }
     }
 
     #[test]
     fn a_path_is_counted() {
-        let counted = PathStatistics::of(&path());
+        let counted = PathStatistics::of(&path(), &Counters::default());
         assert_eq!((counted.with_contact, counted.without_contact), (2, 1));
         assert_eq!((counted.lowest, counted.highest), (Some(-1.0), Some(2.5)));
-        let nothing = PathStatistics::of(&ToolPath {
+        let nothing = ToolPath {
             touches: vec![None],
             ..path()
-        });
+        };
+        let nothing = PathStatistics::of(&nothing, &Counters::default());
         assert_eq!((nothing.lowest, nothing.highest), (None, None));
+        let finer = ToolPath {
+            between: vec![Inserted {
+                index: Index::between(0, 512).expect("between"),
+                touch: Some(Touch {
+                    height: 7.0,
+                    contact: [0.0; 3],
+                }),
+            }],
+            ..path()
+        };
+        let finer = PathStatistics::of(&finer, &Counters::default());
+        assert_eq!((finer.positions, finer.inserted), (4, 1));
+        assert_eq!((finer.with_contact, finer.highest), (3, Some(7.0)));
     }
 
     #[test]
@@ -115,7 +137,7 @@ mod tests {
             version: "0.1.0".to_owned(),
             job: serde_json::json!({ "cutter": { "kind": "ball", "radius": 5.0 } }),
             warnings: vec!["last.stl: 3 edges are open".to_owned()],
-            path: PathStatistics::of(&path()),
+            path: PathStatistics::of(&path(), &Counters::default()),
             verification: None,
             record: Record {
                 phases: vec![Phase {

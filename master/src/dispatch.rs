@@ -33,6 +33,8 @@ pub(crate) struct Attempt {
     pub holders: Vec<(Held, String)>,
     /// Positions of the job that have arrived so far.
     pub arrived: Arc<AtomicU64>,
+    /// Those of them that were inserted, which `arrived` does not count.
+    pub inserted: Arc<AtomicU64>,
     pub progress: Progress,
     pub tls: Option<Tls>,
 }
@@ -70,6 +72,12 @@ pub(crate) async fn dispatch(
             attempt
                 .arrived
                 .fetch_sub(positions_received, Ordering::Relaxed);
+            // Beyond what there is memory for the job is over, and the driver has to see it.
+            let all = attempt.inserted.load(Ordering::Relaxed);
+            if attempt.plan.check_inserted(all).is_ok() {
+                let inserted = received.inserted();
+                attempt.inserted.fetch_sub(inserted, Ordering::Relaxed);
+            }
             Err(Undelivered {
                 fault,
                 positions_received,
@@ -231,10 +239,17 @@ async fn receive(
         let left = received.left();
         match reply.kind {
             Some(Reply::Positions(positions)) => {
-                let touches = horma_proto::unpack_positions(&positions).map_err(wrong)?;
-                let count = touches.len() as u64;
-                let taken = received.take(positions.first, touches);
-                taken.map_err(Fault::Wrong)?;
+                let run = horma_proto::unpack_positions(&positions, total).map_err(wrong)?;
+                let count = run.touches.len() as u64;
+                let inserted = run.between.len() as u64;
+                if inserted > 0 && attempt.plan.job.motion.path_tolerance.is_none() {
+                    let why = "it inserted positions that nobody asked for";
+                    return Err(Fault::Wrong(why.to_owned()));
+                }
+                received.take(run).map_err(Fault::Wrong)?;
+                let all = attempt.inserted.fetch_add(inserted, Ordering::Relaxed) + inserted;
+                let fits = attempt.plan.check_inserted(all);
+                fits.map_err(|e| Fault::Lost(e.to_string()))?;
                 let arrived = attempt.arrived.fetch_add(count, Ordering::Relaxed) + count;
                 (attempt.progress)("digitize", arrived, total);
             }

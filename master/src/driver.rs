@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use horma_core::{
@@ -206,6 +206,8 @@ struct RunningJob {
     progress: Progress,
     /// Positions that have arrived.
     arrived: Arc<AtomicU64>,
+    /// Inserted positions that have arrived.
+    inserted: Arc<AtomicU64>,
     /// What was delivered and kept, by extent.
     kept: BTreeMap<u32, (Vec<SubTrajectory>, ExtentRecord)>,
     /// What placing rows has taken so far, by extent.
@@ -322,6 +324,7 @@ impl Driver {
                     users,
                     progress,
                     arrived: Arc::default(),
+                    inserted: Arc::default(),
                     kept: BTreeMap::new(),
                     placed: BTreeMap::new(),
                     lost: Vec::new(),
@@ -395,6 +398,15 @@ impl Driver {
             return;
         };
         job.calls.remove(&task);
+        let inserted = job.inserted.load(Ordering::Relaxed);
+        if let Err(error) = job.plan.check_inserted(inserted) {
+            warn!(job = task.job, %error, "failed");
+            self.apply(Event::Cancelled { job: task.job }, None);
+            if let Some(job) = self.jobs.remove(&task.job) {
+                let _ = job.reply.send(Err(Error::Plan(error)));
+            }
+            return;
+        }
         match outcome {
             Ok(delivery) => {
                 info!(%task, worker, "delivered");
@@ -513,6 +525,7 @@ impl Driver {
             extent,
             holders: rows.into_iter().map(located).collect(),
             arrived: job.arrived.clone(),
+            inserted: job.inserted.clone(),
             progress: job.progress.clone(),
             tls: self.config.tls.clone(),
         };

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use horma_core::{SubTrajectory, Touch};
+use horma_core::SubTrajectory;
 
 /// What has come of an extent so far.
 pub(crate) struct Received {
@@ -24,9 +24,9 @@ impl Received {
         }
     }
 
-    /// Takes positions in, or says why they cannot be right.
-    pub fn take(&mut self, first: u64, touches: Vec<Option<Touch>>) -> Result<(), String> {
-        let count = touches.len() as u64;
+    /// Takes positions in, and what was inserted on their moves, or says why they cannot be right.
+    pub fn take(&mut self, come: SubTrajectory) -> Result<(), String> {
+        let (first, count) = (come.first, come.touches.len() as u64);
         let (begin, end) = (self.first, self.first + self.count);
         if first < begin || first > end || count > end - first {
             return Err(format!(
@@ -38,7 +38,7 @@ impl Received {
             return Ok(());
         }
         let before = self.runs.range(..=first).next_back();
-        let before = before.map_or(begin, |(_, run)| end_of(run));
+        let before = before.map_or(begin, |(_, run)| run.end());
         let after = self.runs.range(first..).next().map_or(end, |(&i, _)| i);
         if first < before || first + count > after {
             return Err(format!(
@@ -48,9 +48,12 @@ impl Received {
         self.so_far += count;
         // Most follow what came last.
         match self.runs.range_mut(..=first).next_back() {
-            Some((_, run)) if end_of(run) == first => run.touches.extend(touches),
+            Some((_, run)) if run.end() == first => {
+                run.touches.extend(come.touches);
+                run.between.extend(come.between);
+            }
             _ => {
-                self.runs.insert(first, SubTrajectory { first, touches });
+                self.runs.insert(first, come);
             }
         }
         Ok(())
@@ -66,20 +69,22 @@ impl Received {
         self.count - self.so_far
     }
 
+    /// Number of positions that have come with them, inserted.
+    pub fn inserted(&self) -> u64 {
+        let runs = self.runs.values();
+        runs.map(|run| run.between.len() as u64).sum()
+    }
+
     /// What has come, in order.
     pub fn into_parts(self) -> Vec<SubTrajectory> {
         self.runs.into_values().collect()
     }
 }
 
-/// The position after a run's last.
-fn end_of(run: &SubTrajectory) -> u64 {
-    run.first + run.touches.len() as u64
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use horma_core::Touch;
     use proptest::prelude::*;
 
     fn touch(index: u64) -> Option<Touch> {
@@ -103,7 +108,11 @@ mod tests {
                 let range = from..from + n;
                 let inside = from >= first && range.end <= first + count;
                 let twice = range.clone().any(|i| came[i as usize]);
-                let taken = received.take(from, range.clone().map(touch).collect());
+                let taken = received.take(SubTrajectory {
+                    first: from,
+                    touches: range.clone().map(touch).collect(),
+                    between: Vec::new(),
+                });
                 prop_assert_eq!(taken.is_ok(), inside && !twice);
                 if taken.is_ok() {
                     range.for_each(|i| came[i as usize] = true);

@@ -11,7 +11,7 @@ use horma_proto::wire::{
     self, HeartbeatReply, HeartbeatRequest, RegisterReply, RegisterRequest, SubmitReply,
     SubmitRequest,
 };
-use horma_proto::{CHUNK_BYTES, Error, Guard, Messages, POSITION_BYTES, Role, VERSION};
+use horma_proto::{Error, Guard, Messages, Role, VERSION};
 use tokio::sync::{mpsc, oneshot};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request as Call, Response, Status, Streaming};
@@ -209,10 +209,8 @@ async fn send(replies: &mpsc::Sender<Result<SubmitReply, Status>>, (path, record
     let header = wire::PathHeader {
         trajectory: Some(horma_proto::trajectory_to_wire(&path.trajectory)),
     };
-    let size = CHUNK_BYTES / POSITION_BYTES;
-    let positions = path.touches.chunks(size).zip((0..).step_by(size));
-    let positions = positions
-        .map(|(touches, first)| Reply::Positions(horma_proto::pack_positions(first, touches)));
+    let positions = horma_proto::position_chunks(0, &path.touches, &path.between);
+    let positions = positions.map(Reply::Positions);
     let record = serde_json::to_vec(&record).map(|json| Reply::Record(json.into()));
     let kinds = std::iter::once(Reply::Path(header)).chain(positions);
     let all = kinds

@@ -1,7 +1,7 @@
 //! Chunks: how rows, bodies and positions travel without any message growing with the job.
 
 use bytes::{Buf, Bytes, BytesMut};
-use horma_core::Touch;
+use horma_core::{Index, Inserted, SubTrajectory, Touch};
 use prost::Message;
 
 use crate::error::{Error, Result};
@@ -15,7 +15,7 @@ pub const CHUNK_BYTES: usize = 1 << 20;
 const MAX_PIECE: usize = 1 << 30;
 
 /// Bytes of one packed position.
-pub const POSITION_BYTES: usize = 32;
+const POSITION_BYTES: usize = 32;
 
 /// Packs messages, length-delimited, into chunks.
 pub struct Chunks<I> {
@@ -111,54 +111,130 @@ impl Messages {
     }
 }
 
-/// Packs consecutive positions from `first` on.
-pub fn pack_positions(first: u64, touches: &[Option<Touch>]) -> wire::Positions {
-    let mut bytes = Vec::with_capacity(touches.len() * POSITION_BYTES);
-    for touch in touches {
+/// Bytes of one packed inserted position: its index before it.
+const INSERTED_BYTES: usize = 8 + POSITION_BYTES;
+
+/// Packs consecutive positions from `first` on, and all that was inserted on the moves that begin
+/// there, into as many messages as it takes: of each the content is [`CHUNK_BYTES`] at most.
+pub fn position_chunks<'a>(
+    mut first: u64,
+    mut touches: &'a [Option<Touch>],
+    mut between: &'a [Inserted],
+) -> impl Iterator<Item = wire::Positions> + 'a {
+    std::iter::from_fn(move || {
+        let (mut count, mut inserted, mut bytes) = (0, 0, 0);
+        while count < touches.len() {
+            // A position and its move stay together: that is far less than a chunk.
+            let next = first + count as u64;
+            let own = between[inserted..].partition_point(|i| i.index.floor() <= next);
+            bytes += POSITION_BYTES + own * INSERTED_BYTES;
+            if bytes > CHUNK_BYTES && count > 0 {
+                break;
+            }
+            (count, inserted) = (count + 1, inserted + own);
+        }
+        let (some, own);
+        (some, touches) = touches.split_at(count);
+        (own, between) = between.split_at(inserted);
+        let packed = (count > 0).then(|| pack_positions(first, some, own));
+        first += count as u64;
+        packed
+    })
+}
+
+/// Packs consecutive positions from `first` on, and what was inserted, into one message.
+pub fn pack_positions(
+    first: u64,
+    touches: &[Option<Touch>],
+    between: &[Inserted],
+) -> wire::Positions {
+    let pack = |bytes: &mut Vec<u8>, touch: &Option<Touch>| {
         let [x, y, z] = touch.map_or([f64::NAN; 3], |t| t.contact);
         for number in [touch.map_or(f64::NAN, |t| t.height), x, y, z] {
             bytes.extend_from_slice(&number.to_le_bytes());
         }
+    };
+    let mut bytes = Vec::with_capacity(touches.len() * POSITION_BYTES);
+    for touch in touches {
+        pack(&mut bytes, touch);
+    }
+    let mut inserted = Vec::with_capacity(between.len() * INSERTED_BYTES);
+    for Inserted { index, touch } in between {
+        let index = index.floor() * u64::from(Index::PARTS) + u64::from(index.parts());
+        inserted.extend_from_slice(&index.to_le_bytes());
+        pack(&mut inserted, touch);
     }
     wire::Positions {
         first,
-        crc32c: crc32c::crc32c(&bytes),
+        crc32c: crc32c::crc32c_append(crc32c::crc32c(&bytes), &inserted),
         touches: Bytes::from(bytes),
+        between: Bytes::from(inserted),
     }
 }
 
-/// Unpacks positions.
+/// Unpacks positions of a trajectory that has so many.
 ///
 /// # Errors
-/// [`Error::Checksum`], [`Error::Ragged`], or [`Error::Malformed`] if a number is infinite or only
-/// some of a position's numbers are there.
-pub fn unpack_positions(positions: &wire::Positions) -> Result<Vec<Option<Touch>>> {
-    let found = crc32c::crc32c(&positions.touches);
-    if found != positions.crc32c {
-        let expected = positions.crc32c;
+/// [`Error::Checksum`], [`Error::Ragged`], [`Error::Malformed`] if a number is infinite or only
+/// some of a position's numbers are there, [`Error::Core`] for an inserted position that does not
+/// belong there.
+pub fn unpack_positions(packed: &wire::Positions, positions: u64) -> Result<SubTrajectory> {
+    let found = crc32c::crc32c_append(crc32c::crc32c(&packed.touches), &packed.between);
+    if found != packed.crc32c {
+        let expected = packed.crc32c;
         return Err(Error::Checksum { found, expected });
     }
-    let (all, rest) = positions.touches.as_chunks::<POSITION_BYTES>();
-    if !rest.is_empty() {
-        return Err(Error::Ragged {
-            what: "positions",
-            bytes: positions.touches.len(),
-            size: POSITION_BYTES,
-        });
-    }
-    let touch = |bytes: &[u8; POSITION_BYTES]| {
+    let touches = pieces::<POSITION_BYTES>(&packed.touches, "positions")?;
+    let between = pieces::<INSERTED_BYTES>(&packed.between, "inserted positions")?;
+    let inserted = |bytes: &[u8; INSERTED_BYTES]| {
         let (numbers, _) = bytes.as_chunks::<8>();
-        let number = |i: usize| f64::from_le_bytes(numbers[i]);
-        let (height, contact) = (number(0), [number(1), number(2), number(3)]);
-        if height.is_nan() && contact.iter().all(|c| c.is_nan()) {
-            Ok(None)
-        } else if height.is_finite() && contact.iter().all(|c| c.is_finite()) {
-            Ok(Some(Touch { height, contact }))
-        } else {
-            Err(Error::Malformed("a position that is half there".to_owned()))
-        }
+        let index = u64::from_le_bytes(numbers[0]);
+        let parts = u64::from(Index::PARTS);
+        let index = Index::between(index / parts, (index % parts) as u16);
+        let whole = || Error::Malformed("an inserted position with a whole index".to_owned());
+        Ok(Inserted {
+            index: index.ok_or_else(whole)?,
+            touch: touch(&numbers[1..])?,
+        })
     };
-    all.iter().map(touch).collect()
+    let run = SubTrajectory {
+        first: packed.first,
+        touches: touches
+            .iter()
+            .map(|bytes| touch(bytes.as_chunks::<8>().0))
+            .collect::<Result<_>>()?,
+        between: between.iter().map(inserted).collect::<Result<_>>()?,
+    };
+    if run.first.checked_add(run.touches.len() as u64).is_none() {
+        return Err(Error::Malformed("positions without end".to_owned()));
+    }
+    run.validate(positions)?;
+    Ok(run)
+}
+
+fn pieces<'a, const N: usize>(bytes: &'a [u8], what: &'static str) -> Result<&'a [[u8; N]]> {
+    let (all, rest) = bytes.as_chunks::<N>();
+    if rest.is_empty() {
+        return Ok(all);
+    }
+    Err(Error::Ragged {
+        what,
+        bytes: bytes.len(),
+        size: N,
+    })
+}
+
+/// A touch from its four numbers.
+fn touch(numbers: &[[u8; 8]]) -> Result<Option<Touch>> {
+    let number = |i: usize| f64::from_le_bytes(numbers[i]);
+    let (height, contact) = (number(0), [number(1), number(2), number(3)]);
+    if height.is_nan() && contact.iter().all(|c| c.is_nan()) {
+        Ok(None)
+    } else if height.is_finite() && contact.iter().all(|c| c.is_finite()) {
+        Ok(Some(Touch { height, contact }))
+    } else {
+        Err(Error::Malformed("a position that is half there".to_owned()))
+    }
 }
 
 #[cfg(test)]
@@ -198,23 +274,91 @@ mod tests {
         assert_eq!(back, rows);
     }
 
+    const TOUCH: Touch = Touch {
+        height: 1.5,
+        contact: [1.0, -2.0, 3.0],
+    };
+
+    fn inserted(whole: u64, parts: u16) -> Inserted {
+        Inserted {
+            index: Index::between(whole, parts).expect("between"),
+            touch: parts.is_multiple_of(2).then_some(TOUCH),
+        }
+    }
+
     #[test]
     fn a_flipped_bit_is_found() {
-        let touch = Touch {
-            height: 1.5,
-            contact: [1.0, -2.0, 3.0],
+        let (touches, between) = ([Some(TOUCH), None], [inserted(7, 512), inserted(8, 3)]);
+        let good = pack_positions(7, &touches, &between);
+        let run = unpack_positions(&good, 10).expect("intact");
+        assert_eq!(
+            (run.first, &run.touches[..], &run.between[..]),
+            (7, &touches[..], &between[..])
+        );
+        let fields: [fn(&mut wire::Positions) -> &mut Bytes; 2] =
+            [|p| &mut p.touches, |p| &mut p.between];
+        for field in fields {
+            let mut bad = good.clone();
+            let bytes = field(&mut bad);
+            let mut flipped = bytes.to_vec();
+            flipped[3] ^= 1;
+            *bytes = flipped.into();
+            let unpacked = unpack_positions(&bad, 10);
+            assert!(matches!(unpacked, Err(Error::Checksum { .. })));
+        }
+    }
+
+    #[test]
+    fn what_was_inserted_elsewhere_is_refused() {
+        let touches = [None; 2];
+        for between in [
+            &[inserted(6, 1)][..],
+            &[inserted(9, 1)],
+            &[inserted(7, 2), inserted(7, 2)],
+            &[inserted(8, 2), inserted(7, 2)],
+        ] {
+            let packed = pack_positions(7, &touches, between);
+            let unpacked = unpack_positions(&packed, 10);
+            assert!(matches!(unpacked, Err(Error::Core(_))), "{between:?}");
+        }
+        let last = pack_positions(7, &touches, &[inserted(8, 2)]);
+        assert!(
+            unpack_positions(&last, 9).is_err(),
+            "no move begins at the last position"
+        );
+        let whole = wire::Positions {
+            between: [&7168u64.to_le_bytes()[..], &[0; POSITION_BYTES]]
+                .concat()
+                .into(),
+            ..wire::Positions::default()
         };
-        let good = pack_positions(7, &[Some(touch), None]);
-        assert_eq!(unpack_positions(&good), Ok(vec![Some(touch), None]));
-        let mut bytes = good.touches.to_vec();
-        bytes[3] ^= 1;
-        let bad = wire::Positions {
-            touches: bytes.into(),
-            ..good
+        let whole = wire::Positions {
+            crc32c: crc32c::crc32c(&whole.between),
+            ..whole
         };
         assert!(matches!(
-            unpack_positions(&bad),
-            Err(Error::Checksum { .. })
+            unpack_positions(&whole, 10),
+            Err(Error::Malformed(_))
         ));
+    }
+
+    #[test]
+    fn no_message_grows_with_what_was_inserted() {
+        let touches = vec![Some(TOUCH); 100];
+        let moves = (1000..1099).flat_map(|whole| (1..1024).map(move |k| inserted(whole, k)));
+        let between: Vec<Inserted> = moves.collect();
+        let mut run = SubTrajectory {
+            first: 1000,
+            ..SubTrajectory::default()
+        };
+        for message in position_chunks(1000, &touches, &between) {
+            assert!(message.touches.len() + message.between.len() <= CHUNK_BYTES);
+            assert_eq!(message.first, run.end());
+            let part = unpack_positions(&message, 2000).expect("intact");
+            run.touches.extend(part.touches);
+            run.between.extend(part.between);
+        }
+        assert_eq!((run.touches, run.between), (touches, between));
+        assert_eq!(position_chunks(3, &[], &[]).count(), 0);
     }
 }

@@ -48,6 +48,7 @@ pub fn job_to_wire(job: &Job) -> wire::Job {
             points_per_revolution: job.motion.points_per_revolution,
             from: job.motion.from,
             to: job.motion.to,
+            path_tolerance: job.motion.path_tolerance,
         }),
         contact: match job.contact {
             Contact::Point => wire::Contact::Point,
@@ -87,9 +88,8 @@ pub fn job_from_wire(job: &wire::Job) -> Result<Job> {
         points_per_revolution: motion.points_per_revolution,
         from: motion.from,
         to: motion.to,
+        path_tolerance: motion.path_tolerance,
     };
-    discretization.validate()?;
-    motion.validate()?;
     let job = Job {
         discretization,
         cutter,
@@ -109,7 +109,7 @@ pub fn job_from_wire(job: &wire::Job) -> Result<Job> {
             wire::Method::Unspecified => return Err(missing("job", "a method")),
         },
     };
-    job.method.validate(job.contact)?;
+    job.validate()?;
     Ok(job)
 }
 
@@ -148,6 +148,7 @@ pub fn counters_to_wire(counters: Counters) -> wire::Counters {
         nodes: counters.nodes,
         lost: counters.lost,
         largest_loss: counters.largest_loss,
+        beyond_tolerance: counters.beyond_tolerance,
     }
 }
 
@@ -158,6 +159,7 @@ pub fn counters_from_wire(counters: wire::Counters) -> Counters {
         nodes: counters.nodes,
         lost: counters.lost,
         largest_loss: counters.largest_loss,
+        beyond_tolerance: counters.beyond_tolerance,
     }
 }
 
@@ -200,6 +202,7 @@ pub fn trajectory_from_wire(t: Option<&wire::Trajectory>) -> Result<Trajectory> 
         points_per_revolution: t.points_per_revolution,
         from: Some(t.from),
         to: None,
+        path_tolerance: None,
     };
     motion.validate()?;
     Ok(Trajectory {
@@ -431,6 +434,7 @@ mod tests {
                 points_per_revolution: 360,
                 from: None,
                 to: Some(12.5),
+                path_tolerance: None,
             },
             contact: Contact::Facet,
             method: Method::Brute,
@@ -446,6 +450,7 @@ mod tests {
         ] {
             let mut job = job(cutter.expect("valid"));
             assert_eq!(job_from_wire(&job_to_wire(&job)), Ok(job));
+            job.motion.path_tolerance = Some(0.005);
             job.contact = Contact::Point;
             job.method = Method::Local(Local {
                 window: Some(Window {
@@ -471,8 +476,13 @@ mod tests {
         };
         let bad = wire::Job {
             cutter: Some(wire::job::Cutter::Torus(negative)),
-            ..good
+            ..good.clone()
         };
+        assert!(matches!(job_from_wire(&bad), Err(Error::Core(_))));
+        let mut bad = good.clone();
+        if let Some(motion) = &mut bad.motion {
+            motion.path_tolerance = Some(f64::NAN);
+        }
         assert!(matches!(job_from_wire(&bad), Err(Error::Core(_))));
         let bad = wire::Job { contact: 0, ..good };
         assert!(matches!(job_from_wire(&bad), Err(Error::Missing { .. })));

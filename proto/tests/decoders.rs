@@ -3,6 +3,7 @@
 mod common;
 
 use common::DECODERS;
+use horma_core::{Index, Inserted};
 use horma_proto::wire;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -52,6 +53,7 @@ fn good() -> Vec<Vec<u8>> {
             points_per_revolution: 360,
             from: Some(-1.0),
             to: Some(1.0),
+            path_tolerance: Some(0.005),
         }),
         contact: wire::Contact::Facet.into(),
         method: wire::Method::Exact.into(),
@@ -99,11 +101,15 @@ fn good() -> Vec<Vec<u8>> {
             triangles: triangle.into(),
         }),
     ];
+    let between = [(5, 256), (6, 1023)].map(|(whole, parts)| Inserted {
+        index: Index::between(whole, parts).expect("between"),
+        touch: None,
+    });
     let mut all = vec![
         job.encode_to_vec(),
         task.encode_to_vec(),
         row.encode_to_vec(),
-        horma_proto::pack_positions(5, &[None, None]).encode_to_vec(),
+        horma_proto::pack_positions(5, &[None, None], &between).encode_to_vec(),
         // Rows in chunks: sizes first.
         [
             vec![3, 40, 0, 7, 9, 200, 1, 1],

@@ -237,12 +237,16 @@ impl Digitizing {
         let begin = Instant::now();
         let mut abandoned = false;
         let positions = run.first..run.first + run.count;
-        let counters = digitizer.run_chunks(&self.trajectory, positions, |first, touches| {
-            debug!(%id, first, count = touches.len(), "positions");
-            let positions = Reply::Positions(horma_proto::pack_positions(first, &touches));
-            let sent = self.replies.blocking_send(Ok(reply(id, positions)));
-            abandoned = self.shutdown.is_cancelled() || sent.is_err();
-            !abandoned
+        let counters = digitizer.run_chunks(&self.trajectory, positions, |run| {
+            let (first, count) = (run.first, run.touches.len());
+            debug!(%id, first, count, between = run.between.len(), "positions");
+            let mut messages = horma_proto::position_chunks(first, &run.touches, &run.between);
+            let sent = messages.all(|m| {
+                let message = reply(id, Reply::Positions(m));
+                !self.shutdown.is_cancelled() && self.replies.blocking_send(Ok(message)).is_ok()
+            });
+            abandoned = !sent;
+            sent
         });
         (!abandoned).then(|| Cost {
             counters,

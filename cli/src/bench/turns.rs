@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use horma_core::{Counters, Digitizer, MotionKind, Touch, Trajectory};
+use horma_core::{Counters, Digitizer, MotionKind, SubTrajectory, Touch, Trajectory};
 
 /// How much to measure.
 #[derive(Debug, Clone, Copy)]
@@ -121,8 +121,8 @@ impl<'a> Walk<'a> {
     pub fn time(&self) -> f64 {
         let begin = Instant::now();
         for run in &self.runs {
-            let deliver = |_, touches| {
-                black_box::<Vec<Option<Touch>>>(touches);
+            let deliver = |run| {
+                black_box::<SubTrajectory>(run);
                 true
             };
             self.digitizer
@@ -136,8 +136,8 @@ impl<'a> Walk<'a> {
         let mut all = Vec::new();
         let mut counters = Counters::default();
         for run in &self.runs {
-            let deliver = |_, touches: Vec<_>| {
-                all.extend(touches);
+            let deliver = |run: SubTrajectory| {
+                all.extend(run.touches);
                 true
             };
             counters += self

@@ -8,8 +8,9 @@
 use std::sync::OnceLock;
 
 use horma_core::{
-    Body, Contact, Cutter, Digitizer, Direction, Discretization, Extent, Job, Mesh, Method, Motion,
-    MotionKind, Part, Plan, Point, Row, Shape, Simd, Surface, Touch,
+    Body, Contact, Cutter, Digitizer, Direction, Discretization, Extent, Inserted, Job, Mesh,
+    Method, Motion, MotionKind, Part, Plan, Point, Row, Shape, Simd, SubTrajectory, Surface, Touch,
+    stitch,
 };
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -27,6 +28,9 @@ pub struct Case {
 /// Most positions of a case: more than a chunk of the digitizer's has, few enough for brute force.
 const POSITIONS: u64 = 700;
 
+/// The same where positions are inserted between them.
+const POSITIONS_BETWEEN: u64 = 300;
+
 impl Case {
     /// The case that bytes stand for, or `None` if its numbers are out of bounds.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
@@ -37,7 +41,7 @@ impl Case {
         let motion = motion(&mut dice, &part, &cutter);
         let rows = 2 + dice.below(11) as u32;
         let columns = 2 + dice.below(25) as u32;
-        let job = Job {
+        let mut job = Job {
             discretization: Discretization::Grid { rows, columns },
             cutter,
             motion,
@@ -45,6 +49,8 @@ impl Case {
             method: Method::Exact,
         };
         let extents = *dice.pick(&[1, 2, 3, 5, 16]);
+        let share = *dice.pick(&[None, Some(0.1), Some(0.01), Some(0.002)]);
+        job.motion.path_tolerance = share.map(|s: f64| (s * size).max(1.0e-6));
         Some(Self { part, job, extents })
     }
 
@@ -54,7 +60,13 @@ impl Case {
         let Ok(plan) = Plan::new(&self.part, self.job, 1 << 30) else {
             return Ok(0);
         };
-        if plan.trajectory.positions > POSITIONS {
+        let between = self.job.motion.path_tolerance.is_some();
+        let most = if between {
+            POSITIONS_BETWEEN
+        } else {
+            POSITIONS
+        };
+        if plan.trajectory.positions > most {
             return Ok(0);
         }
         let all = 0..plan.trajectory.positions;
@@ -69,23 +81,33 @@ impl Case {
         for &simd in &levels {
             if self.job.contact == Contact::Point {
                 let got = run(&plan, brute, rows, simd, 1, all.clone());
-                compared += same(&wanted, &got, 0).map_err(|e| format!("brute {simd}: {e}"))?;
+                compared += same(&wanted, &got).map_err(|e| format!("brute {simd}: {e}"))?;
             }
             for threads in [1, 3] {
                 let got = run(&plan, self.job, rows, simd, threads, all.clone());
                 let name = || format!("exact {simd} on {threads} threads");
-                compared += same(&wanted, &got, 0).map_err(|e| format!("{}: {e}", name()))?;
+                compared += same(&wanted, &got).map_err(|e| format!("{}: {e}", name()))?;
             }
         }
-        for extent in plan.split(self.extents) {
-            let (rows, range) = (rows_of(&plan, &extent), positions(&extent));
-            let part = &wanted[range.start as usize..range.end as usize];
-            for (name, job) in [("exact", self.job), ("brute", brute)] {
+        for (name, job) in [("exact", self.job), ("brute", brute)] {
+            let (mut parts, mut beyond) = (Vec::new(), 0);
+            for extent in plan.split(self.extents) {
+                let (rows, range) = (rows_of(&plan, &extent), positions(&extent));
                 let got = run(&plan, job, &rows, Simd::best(), 1, range.clone());
-                let name = || format!("{name}, extent {} of {}", extent.id, self.extents);
-                compared +=
-                    same(part, &got, range.start).map_err(|e| format!("{}: {e}", name()))?;
+                beyond += got.beyond;
+                parts.push(got.path);
             }
+            let path = stitch(plan.trajectory, parts).map_err(|e| e.to_string())?;
+            let got = Run {
+                path: SubTrajectory {
+                    first: 0,
+                    touches: path.touches,
+                    between: path.between,
+                },
+                beyond,
+            };
+            let name = || format!("{name} in {} extents", self.extents);
+            compared += same(&wanted, &got).map_err(|e| format!("{}: {e}", name()))?;
         }
         Ok(compared)
     }
@@ -101,7 +123,13 @@ fn positions(extent: &Extent) -> std::ops::Range<u64> {
     extent.first..extent.first + extent.count
 }
 
-/// The touches of some positions, on a pool of so many threads.
+/// What digitizing gives, and how many moves stray all the same.
+struct Run {
+    path: SubTrajectory,
+    beyond: u64,
+}
+
+/// The touches of some positions, and what is inserted, on a pool of so many threads.
 fn run(
     plan: &Plan,
     job: Job,
@@ -109,20 +137,26 @@ fn run(
     simd: Simd,
     threads: usize,
     positions: std::ops::Range<u64>,
-) -> Vec<Option<Touch>> {
+) -> Run {
     static POOLS: [OnceLock<ThreadPool>; 4] = [const { OnceLock::new() }; 4];
     let pool = POOLS[threads].get_or_init(|| {
         let builder = ThreadPoolBuilder::new().num_threads(threads);
         builder.build().expect("threads can be started")
     });
     pool.install(|| {
-        let mut touches = Vec::new();
+        let mut path = SubTrajectory {
+            first: positions.start,
+            ..SubTrajectory::default()
+        };
         let digitizer = Digitizer::new(&job, rows, simd);
-        digitizer.run_chunks(&plan.trajectory, positions, |_, chunk| {
-            touches.extend(chunk);
+        let counters = digitizer.run_chunks(&plan.trajectory, positions, |chunk| {
+            assert_eq!(chunk.first, path.end());
+            path.touches.extend(chunk.touches);
+            path.between.extend(chunk.between);
             true
         });
-        touches
+        let beyond = counters.beyond_tolerance;
+        Run { path, beyond }
     })
 }
 
@@ -131,18 +165,34 @@ fn bits(touch: &Option<Touch>) -> Option<[u64; 4]> {
     Some([touch.as_ref()?.height.to_bits(), x, y, z])
 }
 
-/// Compares bit by bit; `first` is the index of the first position.
-fn same(wanted: &[Option<Touch>], got: &[Option<Touch>], first: u64) -> Result<usize, String> {
-    if wanted.len() != got.len() {
-        return Err(format!("{} positions, not {}", got.len(), wanted.len()));
-    }
-    let pairs = wanted.iter().zip(got);
-    for (index, (wanted, got)) in (first..).zip(pairs) {
+/// Compares bit by bit.
+fn same(wanted: &Run, got: &Run) -> Result<usize, String> {
+    let (touches, between) = (&wanted.path.touches, &wanted.path.between);
+    let counts = |r: &Run| {
+        [
+            r.path.touches.len(),
+            r.path.between.len(),
+            r.beyond as usize,
+        ]
+    };
+    for (index, (wanted, got)) in touches.iter().zip(&got.path.touches).enumerate() {
         if bits(wanted) != bits(got) {
             return Err(format!("position {index}: {got:?}, not {wanted:?}"));
         }
     }
-    Ok(wanted.len())
+    for (wanted, got) in between.iter().zip(&got.path.between) {
+        let all = |i: &Inserted| (i.index, bits(&i.touch));
+        if all(wanted) != all(got) {
+            return Err(format!("between: {got:?}, not {wanted:?}"));
+        }
+    }
+    if counts(wanted) != counts(got) {
+        let (got, wanted) = (counts(got), counts(wanted));
+        return Err(format!(
+            "positions, inserted, beyond: {got:?}, not {wanted:?}"
+        ));
+    }
+    Ok(touches.len() + between.len())
 }
 
 /// Decisions, read off bytes.
@@ -570,5 +620,6 @@ fn motion(dice: &mut Dice, part: &Part, cutter: &Cutter) -> Motion {
         points_per_revolution,
         from,
         to,
+        path_tolerance: None,
     }
 }

@@ -30,6 +30,7 @@ impl JobFile {
                 "points_per_revolution": motion.points_per_revolution,
                 "from": motion.from,
                 "to": motion.to,
+                "path_tolerance": motion.path_tolerance,
             },
             "digitizing": digitizing_echo(&self.job),
             "cluster": {

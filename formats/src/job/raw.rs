@@ -111,6 +111,7 @@ pub(super) struct RawMotion {
     pub(super) points_per_revolution: Option<Given<i64>>,
     pub(super) from: Option<Given<f64>>,
     pub(super) to: Option<Given<f64>>,
+    pub(super) path_tolerance: Option<Given<f64>>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -194,6 +195,8 @@ impl RawJob {
             put(&mut motion.step, "step", &by.step);
             put(&mut motion.from, "from", &by.from);
             put(&mut motion.to, "to", &by.to);
+            let tolerance = &mut motion.path_tolerance;
+            put(tolerance, "path_tolerance", &by.path_tolerance);
         }
     }
 
@@ -215,6 +218,7 @@ impl RawJob {
             "points_per_revolution" => number(&motion?.points_per_revolution),
             "from" => number(&motion?.from),
             "to" => number(&motion?.to),
+            "path_tolerance" => number(&motion?.path_tolerance),
             _ => {
                 let mut dimensions = self.cutter.as_ref()?.value.dimensions().into_iter();
                 dimensions.find_map(|(k, v)| v.filter(|_| k == key).map(|g| &g.at))

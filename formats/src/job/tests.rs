@@ -296,6 +296,7 @@ fn flags_take_the_place_of_the_file() {
         step: Some(3.0),
         contact: Some("facet".to_owned()),
         to: Some(9.0),
+        path_tolerance: Some(0.25),
         ..Overrides::default()
     };
     let text = JOB.replacen("tolerance = 0.02", "grid = { rows = 9, columns = 9 }", 1);
@@ -303,6 +304,7 @@ fn flags_take_the_place_of_the_file() {
     assert_eq!((j.cluster.workers, j.job.contact), (5, Contact::Facet));
     assert_eq!(j.job.discretization, Discretization::Tolerance(0.5));
     assert_eq!((j.job.motion.step, j.job.motion.to), (3.0, Some(9.0)));
+    assert_eq!(j.job.motion.path_tolerance, Some(0.25));
     let zero = Overrides {
         points_per_revolution: Some(0),
         ..Overrides::default()
@@ -314,8 +316,31 @@ fn flags_take_the_place_of_the_file() {
 }
 
 #[test]
+fn a_path_tolerance_is_positive_and_has_heights_between_positions() {
+    let tolerance = |t: &str| format!("step = 2\npath_tolerance = {t}");
+    let j = valid(&JOB.replacen("step = 2", &tolerance("0.005"), 1));
+    assert_eq!(j.job.motion.path_tolerance, Some(0.005));
+    assert_eq!(j.echo()["motion"]["path_tolerance"], 0.005);
+    assert_eq!(valid(JOB).job.motion.path_tolerance, None);
+    for bad in ["0", "-0.1", "nan", "inf", "1e-9"] {
+        let expected = "must be at least 0.000001 mm and at most a kilometre";
+        refused("step = 2", &tolerance(bad), expected);
+        refused("step = 2", &tolerance(bad), "13 | path_tolerance");
+    }
+    let alone = JOB
+        .replacen("step = 2", &tolerance("0.005"), 1)
+        .replacen("workers = 3", "workers = 0", 1)
+        .replacen("\"brute\"", "\"local\"\nfallback = false", 1);
+    let error = job(&alone, &Overrides::default())
+        .expect_err("no heights")
+        .to_string();
+    assert!(error.contains("without its fallback"), "{error}");
+    assert!(error.contains("13 | path_tolerance"), "{error}");
+}
+
+#[test]
 fn the_echo_is_a_job_again() {
-    let j = valid(JOB);
+    let j = valid(&JOB.replacen("step = 2", "step = 2\npath_tolerance = 0.005", 1));
     let mut echo = j.echo();
     // TOML has no null.
     echo["motion"]

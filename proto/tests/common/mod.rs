@@ -52,13 +52,14 @@ pub fn positions(bytes: &[u8]) {
         return;
     };
     // Nearly always refused.
-    let _ = horma_proto::unpack_positions(&positions);
-    positions.crc32c = crc32c::crc32c(&positions.touches);
-    let Ok(touches) = horma_proto::unpack_positions(&positions) else {
+    let _ = horma_proto::unpack_positions(&positions, u64::MAX);
+    let crc = crc32c::crc32c(&positions.touches);
+    positions.crc32c = crc32c::crc32c_append(crc, &positions.between);
+    let Ok(run) = horma_proto::unpack_positions(&positions, u64::MAX) else {
         return;
     };
-    let again = horma_proto::pack_positions(positions.first, &touches);
-    assert_eq!(horma_proto::unpack_positions(&again), Ok(touches));
+    let again = horma_proto::pack_positions(run.first, &run.touches, &run.between);
+    assert_eq!(horma_proto::unpack_positions(&again, u64::MAX), Ok(run));
 }
 
 /// Messages out of a stream of chunks, which end wherever the first bytes say.
