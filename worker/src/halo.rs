@@ -109,12 +109,16 @@ async fn fetch(source: Source) -> Result<Fetched, Lost> {
     }
 }
 
-/// Whether nothing was answered, rather than no: a worker that does not hold the rows, or holds others,
-/// will not do better when it is asked again.
+/// Whether the way there may have failed: a worker that does not hold the rows, holds others, or has
+/// been silent for long will not do better when it is asked again.
 fn may_pass(status: &Status) -> bool {
     !matches!(
         status.code(),
-        Code::NotFound | Code::DataLoss | Code::InvalidArgument | Code::Unimplemented
+        Code::NotFound
+            | Code::DataLoss
+            | Code::InvalidArgument
+            | Code::Unimplemented
+            | Code::DeadlineExceeded
     )
 }
 
