@@ -111,7 +111,7 @@ fn a_mesh_is_the_same_on_any_number_of_workers() {
 fn surfaces_take_less_than_a_hundredth_of_the_bytes_of_their_points() {
     let dir = scratch();
     let part = sample().with_file_name("last.step");
-    let more = "[discretization]\ngrid = { rows = 600, columns = 300 }
+    let more = "[discretization]\ngrid = { rows = 700, columns = 500 }
 [cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
 [motion]\nstep = 10.0\npoints_per_revolution = 60\n";
     let job = job(dir.path(), "job.toml", &[&part], more);

@@ -15,7 +15,7 @@ use crate::contact::{Pose, least_height};
 use crate::cutter::Cutter;
 use crate::job::{Contact, Job, Local, Method, Window};
 use crate::lanes::LANES;
-use crate::leaf::{FacetLeaf, Leaf, PointLeaf};
+use crate::leaf::{Best, FacetLeaf, Leaf, PointLeaf};
 use crate::local::{self, Grids};
 use crate::motion::{Motion, Trajectory};
 use crate::path::{SubTrajectory, Touch};
@@ -390,7 +390,7 @@ fn near<S: Vectors, L: Leaf>(
             starts.push(Start { pose, floor, place });
         }
         let found = tree.search(simd, cutter, &starts, &mut counters);
-        touches.extend(found.iter().take(eight.len()).map(|best| best.touch()));
+        touches.extend(found.iter().take(eight.len()).map(Best::touch));
     }
     (touches, counters)
 }

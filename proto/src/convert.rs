@@ -476,10 +476,10 @@ mod tests {
         };
         let bad = wire::Job {
             cutter: Some(wire::job::Cutter::Torus(negative)),
-            ..good.clone()
+            ..good
         };
         assert!(matches!(job_from_wire(&bad), Err(Error::Core(_))));
-        let mut bad = good.clone();
+        let mut bad = good;
         if let Some(motion) = &mut bad.motion {
             motion.path_tolerance = Some(f64::NAN);
         }

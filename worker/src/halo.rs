@@ -11,8 +11,8 @@ use horma_proto::wire::{FetchRequest, Span};
 use horma_proto::{Answer, Error, MAX_MESSAGE, Role, TaskId, Tls};
 use tokio::task::JoinSet;
 use tokio::time::timeout;
-use tonic::Status;
 use tonic::transport::Channel;
+use tonic::{Code, Status};
 use tracing::{debug, warn};
 
 use crate::receive::Rows;
@@ -108,10 +108,10 @@ async fn fetch(source: Source, tls: Option<Tls>) -> Result<Fetched, Lost> {
     }
 }
 
-/// Whether nothing was answered, rather than no: a worker that does not hold the rows, or holds others,
-/// will not do better when it is asked again.
+/// Whether the way there may have failed: a worker that does not hold the rows, holds others, or has
+/// been silent for long will not do better when it is asked again.
 fn may_pass(status: &Status) -> bool {
-    Answer::of(status) == Answer::Silence
+    Answer::of(status) == Answer::Silence && status.code() != Code::DeadlineExceeded
 }
 
 async fn ask(source: &Source, tls: Option<&Tls>) -> Result<Fetched, Status> {
