@@ -16,14 +16,15 @@ enum Answer {
     Forgotten,
     /// What it is sent is not a row of the part's.
     Wrong,
-    Never,
+    /// Nothing, until it is told to say that it has none.
+    Late,
 }
 
 /// A worker that takes in rows, and does not give them away as it should.
 struct Keeper {
     answer: Answer,
     /// It takes the rows when it is told so.
-    may_place: Arc<Notify>,
+    told: Arc<Notify>,
 }
 
 type Replies<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
@@ -46,7 +47,7 @@ impl Worker for Keeper {
     ) -> Result<Response<PlaceReply>, Status> {
         let mut requests = request.into_inner();
         while requests.message().await?.is_some() {}
-        self.may_place.notified().await;
+        self.told.notified().await;
         Ok(Response::new(PlaceReply {}))
     }
 
@@ -70,19 +71,22 @@ impl Worker for Keeper {
                 let mut chunks = horma_proto::Chunks::of(std::iter::once(row));
                 chunks.next().expect("a chunk")
             }
-            Answer::Never => std::future::pending().await,
+            Answer::Late => {
+                self.told.notified().await;
+                return Err(Status::not_found("not here any more"));
+            }
         };
         let reply = tokio_stream::iter(vec![Ok(chunk)]);
         Ok(Response::new(Box::pin(reply)))
     }
 }
 
-/// Serves a keeper and registers it; it takes rows once that is notified.
+/// Serves a keeper and registers it; what it returns tells it to go on.
 async fn keep(master: &str, id: &str, answer: Answer) -> Arc<Notify> {
-    let may_place = Arc::new(Notify::new());
+    let told = Arc::new(Notify::new());
     let keeper = Keeper {
         answer,
-        may_place: may_place.clone(),
+        told: told.clone(),
     };
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
     let address = listener.local_addr().expect("bound").to_string();
@@ -93,16 +97,15 @@ async fn keep(master: &str, id: &str, answer: Answer) -> Arc<Notify> {
     register(master, id, horma_proto::VERSION, address)
         .await
         .expect("welcome");
-    may_place
+    told
 }
 
 /// A job whose cutter is as wide as the part, so that every extent needs the rows of every other.
 fn wide_job(dir: &Path) -> PathBuf {
     let part = sample().with_file_name("last.step");
-    let more = "axis = \"auto\"
-[discretization]\ngrid = { rows = 159, columns = 120 }
-[cutter]\nkind = \"cylinder\"\nradius = 40.0\nwidth = 500.0
-[motion]\nstep = 10.0\npoints_per_revolution = 60
+    let more = "[discretization]\ngrid = { rows = 159, columns = 120 }
+[cutter]\nkind = \"cylinder\"\nradius = 40.0\nwidth = 1000.0
+[motion]\nstep = 5.0\npoints_per_revolution = 60\nfrom = 20.0\nto = 250.0
 [cluster]\ndistribution = \"halo\"\n";
     job(dir, "wide.toml", &[&part], more)
 }
@@ -136,8 +139,8 @@ async fn rows_that_their_holder_does_not_give_away_are_placed_elsewhere() {
     ] {
         let (_master, address) = master(&[]);
         // It is first in the alphabet, so it is the first to hold rows.
-        let may_place = keep(&address, "a keeper", answer).await;
-        may_place.notify_one();
+        let keeper = keep(&address, "a keeper", answer).await;
+        keeper.notify_one();
         let _honest = ["b", "c"].map(|id| worker(&address, id));
         let out = dir.path().join(format!("{answer:?}"));
         let (code, log) = submit(&job, &address, &out).end();
@@ -162,17 +165,17 @@ async fn a_holder_killed_before_it_is_asked_costs_no_byte() {
     let (mut master, address) = master(&[]);
     let mut victim = worker(&address, "a victim");
     let mut honest = worker(&address, "b");
-    let may_place = keep(&address, "keeper", Answer::Never).await;
+    let keeper = keep(&address, "keeper", Answer::Late).await;
     let out = dir.path().join("out");
     let client = submit(&job, &address, &out);
     master.wait_for(&["placed", "a victim"]);
     master.wait_for(&["placed", "worker=\"b\""]);
     victim.child.kill().expect("alive");
     victim.child.wait().expect("its end");
-    may_place.notify_one();
+    keeper.notify_one();
     // Of the keeper it hears nothing, of the victim that nobody is there.
     honest.wait_for(&["halo lost", "a victim"]);
-    may_place.notify_one();
+    keeper.notify_one();
     let (code, log) = client.end();
     assert_eq!(code, Some(0), "{log}");
     assert!(std::fs::read(out.join("path.csv")).expect("a path") == alone);
