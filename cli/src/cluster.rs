@@ -47,6 +47,7 @@ pub(crate) async fn run(
         regroup: REGROUP,
         max_part: 0,
         memory: system::memory(),
+        workers_here: true,
     };
     let shutdown = CancellationToken::new();
     let _stopped = shutdown.clone().drop_guard();

@@ -25,6 +25,7 @@ pub(crate) fn master(args: &Master) -> Result<()> {
         regroup: Duration::from_secs(args.patience),
         max_part: args.max_part.saturating_mul(1_000_000),
         memory: system::memory(),
+        workers_here: false,
     };
     serve(async {
         let listener = listen(&args.bind, args.insecure).await?;

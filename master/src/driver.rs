@@ -123,7 +123,7 @@ impl Master {
     ) -> Result<Outcome> {
         let begin = Instant::now();
         progress("discretize", 0, 0);
-        let plan = Arc::new(crate::plan(part, job, distribution, self.config.memory).await?);
+        let plan = Arc::new(crate::plan(part, job, distribution, self.config).await?);
         let discretized = begin.elapsed();
         let parts = self.gather(at_least.max(1)).await?;
 
