@@ -9,6 +9,7 @@ mod error;
 mod service;
 
 mod driver;
+mod running;
 mod state;
 
 mod dispatch;
