@@ -49,6 +49,7 @@ pub(crate) async fn run(
         memory: system::memory(),
         // Master and workers talk within this machine.
         tls: None,
+        workers_here: true,
     };
     let shutdown = CancellationToken::new();
     let _stopped = shutdown.clone().drop_guard();

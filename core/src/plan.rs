@@ -102,11 +102,17 @@ pub enum Stock {
 
 impl Handout {
     /// Plans as [`Plan::new`] does. If the workers make the rows themselves, each is made here only
-    /// for its outline, and dropped.
+    /// for its outline, and dropped; their memory counts if it is the same, `workers_here`.
     ///
     /// # Errors
     /// Those of [`Plan::new`], and [`Error::SurfaceNeedsSurfaces`].
-    pub fn new(part: &Part, job: Job, distribution: Distribution, memory: u64) -> Result<Self> {
+    pub fn new(
+        part: &Part,
+        job: Job,
+        distribution: Distribution,
+        memory: u64,
+        workers_here: bool,
+    ) -> Result<Self> {
         match distribution {
             Distribution::Overlap | Distribution::Halo => {
                 let plan = Plan::new(part, job, memory)?;
@@ -124,7 +130,8 @@ impl Handout {
                 if let Some(name) = mesh(part) {
                     return Err(Error::SurfaceNeedsSurfaces { name });
                 }
-                let (layout, needed) = lay_out(part, &job, memory, 0.0)?;
+                let point_bytes = if workers_here { POINT_BYTES } else { 0.0 };
+                let (layout, needed) = lay_out(part, &job, memory, point_bytes)?;
                 let survey = survey(&layout, drop);
                 Ok(Self {
                     job,

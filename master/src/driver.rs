@@ -5,21 +5,19 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-use horma_core::{
-    Counters, Distribution, Extent, ExtentRecord, Handout, Job, LostAttempt, Part, Phase, Record,
-    SubTrajectory, Traffic, WorkerRecord, stitch,
-};
+use horma_core::{Distribution, Handout, Job, Part, Phase, Record, SubTrajectory, stitch};
 use horma_proto::TaskId;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
-use crate::dispatch::{Attempt, Delivery, Undelivered, dispatch};
+use crate::dispatch::{Delivery, Undelivered, dispatch};
 use crate::error::{Error, Result};
-use crate::place::{Placed, Placing, place};
+use crate::place::{Placed, place};
+use crate::running::RunningJob;
 use crate::state::{Command, Event, Fault, Held, State, Step, apply};
 use crate::{Config, Outcome, Progress};
 
@@ -123,7 +121,7 @@ impl Master {
     ) -> Result<Outcome> {
         let begin = Instant::now();
         progress("discretize", 0, 0);
-        let plan = Arc::new(crate::plan(part, job, distribution, self.config.memory).await?);
+        let plan = Arc::new(crate::plan(part, job, distribution, &self.config).await?);
         let discretized = begin.elapsed();
         let parts = self.gather(at_least.max(1)).await?;
 
@@ -196,27 +194,6 @@ struct Driver {
     incarnation: u64,
     inbox: mpsc::WeakSender<Message>,
     count: watch::Sender<usize>,
-}
-
-struct RunningJob {
-    plan: Arc<Handout>,
-    extents: Vec<Extent>,
-    /// How many extents need each row.
-    users: Vec<u32>,
-    progress: Progress,
-    /// Positions that have arrived.
-    arrived: Arc<AtomicU64>,
-    /// Inserted positions that have arrived.
-    inserted: Arc<AtomicU64>,
-    /// What was delivered and kept, by extent.
-    kept: BTreeMap<u32, (Vec<SubTrajectory>, ExtentRecord)>,
-    /// What placing rows has taken so far, by extent.
-    placed: BTreeMap<u32, Placed>,
-    lost: Vec<LostAttempt>,
-    /// Calls under way: each ends when it is told why, or when the job is dropped.
-    calls: BTreeMap<TaskId, oneshot::Sender<String>>,
-    workers: BTreeMap<String, String>,
-    reply: oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>,
 }
 
 impl Driver {
@@ -301,42 +278,16 @@ impl Driver {
             } => {
                 let job = self.next_job;
                 self.next_job += 1;
-                let extents = plan.split(parts);
-                info!(
-                    job,
-                    extents = extents.len(),
-                    positions = plan.trajectory.positions,
-                    "job"
-                );
-                progress("digitize", 0, plan.trajectory.positions);
-                let count = extents.len() as u32;
-                let mut users = vec![0; plan.outlines.len()];
-                for &row in extents.iter().flat_map(|e| &e.rows) {
-                    users[row as usize] += 1;
-                }
-                let halos = match plan.distribution {
-                    Distribution::Overlap | Distribution::Surface => None,
-                    Distribution::Halo => Some(extents.iter().map(halo).collect()),
-                };
-                let running = RunningJob {
-                    plan,
-                    extents,
-                    users,
-                    progress,
-                    arrived: Arc::default(),
-                    inserted: Arc::default(),
-                    kept: BTreeMap::new(),
-                    placed: BTreeMap::new(),
-                    lost: Vec::new(),
-                    calls: BTreeMap::new(),
-                    workers: BTreeMap::new(),
-                    reply,
-                };
+                let running = RunningJob::new(plan, parts, progress, reply);
+                let (extents, halos) = (running.extents.len() as u32, running.halos());
+                let positions = running.plan.trajectory.positions;
+                info!(job, extents, positions, "job");
+                (running.progress)("digitize", 0, positions);
                 self.jobs.insert(job, running);
                 self.apply(
                     Event::Submitted {
                         job,
-                        extents: count,
+                        extents,
                         halos,
                     },
                     None,
@@ -476,14 +427,7 @@ impl Driver {
         let (call, cut_off) = oneshot::channel();
         job.calls.insert(task, call);
         job.workers.insert(worker.clone(), address.clone());
-        let placing = Placing {
-            master: self.incarnation,
-            task,
-            address: address.clone(),
-            tls: self.config.tls.clone(),
-            plan: job.plan.clone(),
-            rows: job.extents[task.extent as usize].own.clone(),
-        };
+        let placing = job.placing(task, address, self.incarnation, self.config.tls.clone());
         info!(%task, worker, rows = placing.rows.len(), "placing");
         let inbox = self.inbox.clone();
         tokio::spawn(async move {
@@ -510,25 +454,13 @@ impl Driver {
         let (call, cut_off) = oneshot::channel();
         job.calls.insert(task, call);
         job.workers.insert(worker.clone(), address.clone());
-        let extent = job.extents[task.extent as usize].clone();
-        let shared = |row: &&u32| job.users[**row as usize] > 1;
         let located = |held: Held| {
             let address = self.addresses.get(&held.worker).cloned();
             (held, address.unwrap_or_default())
         };
-        let attempt = Attempt {
-            task,
-            worker: worker.clone(),
-            address: address.clone(),
-            plan: job.plan.clone(),
-            overlap_rows: extent.rows.iter().filter(shared).count() as u32,
-            extent,
-            holders: rows.into_iter().map(located).collect(),
-            arrived: job.arrived.clone(),
-            inserted: job.inserted.clone(),
-            progress: job.progress.clone(),
-            tls: self.config.tls.clone(),
-        };
+        let holders = rows.into_iter().map(located).collect();
+        let tls = self.config.tls.clone();
+        let attempt = job.attempt(task, &worker, address, holders, tls);
         info!(%task, worker, positions = attempt.extent.count, "started");
         let inbox = self.inbox.clone();
         tokio::spawn(async move {
@@ -543,57 +475,5 @@ impl Driver {
                 let _ = inbox.send(over).await;
             }
         });
-    }
-}
-
-/// The other extents whose rows one needs.
-fn halo(extent: &Extent) -> Vec<u32> {
-    extent.halo.iter().map(|h| h.extent).collect()
-}
-
-impl RunningJob {
-    /// Writes down an attempt that came to nothing.
-    fn lose(&mut self, worker: &str, task: TaskId, fault: &Fault, positions_received: u64) {
-        self.lost.push(LostAttempt {
-            extent: task.extent,
-            attempt: task.attempt,
-            worker: worker.to_owned(),
-            positions_received,
-            positions: self.extents[task.extent as usize].count,
-            reason: fault.to_string(),
-        });
-    }
-
-    /// Hands over what was kept.
-    fn complete(self) {
-        let mut counters = Counters::default();
-        let mut traffic = Traffic {
-            rows_needed: self.users.iter().filter(|&&n| n > 0).count() as u64,
-            ..Traffic::default()
-        };
-        let (mut parts, mut extents) = (Vec::new(), Vec::new());
-        for (extent, (positions, mut record)) in self.kept {
-            let placed = self.placed.get(&extent).copied().unwrap_or_default();
-            record.rows_sent += placed.rows;
-            record.bytes_sent += placed.bytes;
-            record.place_seconds = placed.seconds;
-            traffic.rows_sent += record.rows_sent;
-            traffic.bytes_to_workers += record.bytes_sent;
-            traffic.bytes_between_workers += record.bytes_fetched;
-            traffic.bytes_of_results += record.bytes_received;
-            counters += record.counters;
-            parts.extend(positions);
-            extents.push(record);
-        }
-        let worker = |(worker, address)| WorkerRecord { worker, address };
-        let record = Record {
-            counters,
-            traffic: Some(traffic),
-            workers: self.workers.into_iter().map(worker).collect(),
-            extents,
-            lost: self.lost,
-            ..Record::default()
-        };
-        let _ = self.reply.send(Ok((parts, record)));
     }
 }

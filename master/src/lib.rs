@@ -10,6 +10,7 @@ mod error;
 mod service;
 
 mod driver;
+mod running;
 mod state;
 
 mod dispatch;
@@ -46,6 +47,8 @@ pub struct Config {
     pub max_part: u64,
     /// Memory that one job may take, bytes.
     pub memory: u64,
+    /// Whether workers share that memory.
+    pub workers_here: bool,
 }
 
 /// A path and how it came about.
@@ -97,9 +100,10 @@ pub(crate) async fn plan(
     part: Part,
     job: Job,
     distribution: Distribution,
-    memory: u64,
+    config: &Config,
 ) -> Result<Handout> {
-    let plan = move || Handout::new(&part, job, distribution, memory);
+    let (memory, here) = (config.memory, config.workers_here);
+    let plan = move || Handout::new(&part, job, distribution, memory, here);
     let planned = tokio::task::spawn_blocking(plan).await;
     planned
         .map_err(|_| Error::Interrupted)?
