@@ -39,9 +39,8 @@ fn height(angle: f64) -> f64 {
     y + (WHEEL * WHEEL - z * z).sqrt()
 }
 
-/// The path, and how many moves stray all the same.
-fn path(kind: MotionKind, path_tolerance: Option<f64>) -> (ToolPath, u64) {
-    let job = Job {
+fn job(kind: MotionKind, path_tolerance: Option<f64>) -> Job {
+    Job {
         discretization: Discretization::Tolerance(0.1),
         cutter: Cutter::cylinder(WHEEL, 8.0).expect("valid"),
         motion: Motion {
@@ -54,7 +53,12 @@ fn path(kind: MotionKind, path_tolerance: Option<f64>) -> (ToolPath, u64) {
         },
         contact: Contact::Facet,
         method: Method::Exact,
-    };
+    }
+}
+
+/// The path, and how many moves stray all the same.
+fn path(kind: MotionKind, path_tolerance: Option<f64>) -> (ToolPath, u64) {
+    let job = job(kind, path_tolerance);
     let plan = Plan::new(&bar(), job, 1 << 30).expect("fits");
     let digitizer = Digitizer::new(&plan.job, &plan.model.rows, Simd::best());
     let mut parts = Vec::new();
@@ -104,4 +108,25 @@ fn straight_moves_over_a_square_bar_stay_within_the_tolerance() {
         // Ten times finer takes about three times as many.
         assert!(before < 64 * coarse.touches.len(), "{before}");
     }
+}
+
+#[test]
+fn what_is_inserted_is_bounded_by_the_memory_that_is_left() {
+    let plan = |memory: u64, path_tolerance: Option<f64>| {
+        Plan::new(&bar(), job(MotionKind::Helix, path_tolerance), memory)
+    };
+    let scarce = plan(50_000, Some(0.01)).expect("fits");
+    assert!(
+        (1..125).contains(&scarce.most_inserted),
+        "{}",
+        scarce.most_inserted
+    );
+    assert_eq!(scarce.check_inserted(scarce.most_inserted), Ok(()));
+    let error = scarce.check_inserted(125).expect_err("too many");
+    assert!(
+        error.is_impossible() && error.to_string().contains("path_tolerance"),
+        "{error}"
+    );
+    // Nobody asked for any.
+    assert_eq!(plan(1 << 30, None).expect("fits").most_inserted, 0);
 }
