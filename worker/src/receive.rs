@@ -179,19 +179,18 @@ fn header_from_wire(header: wire::Task) -> Result<Header> {
 fn check_runs(runs: &[Run], first: u64, end: u64) -> Result<()> {
     let mut order: Vec<(u64, u64)> = runs.iter().map(|r| (r.first, r.count)).collect();
     order.sort_unstable();
-    let mut next = first;
+    let mut next = Some(first);
     for (begin, count) in order {
-        let after = begin.checked_add(count).filter(|_| begin == next);
-        let Some(after) = after else { break };
-        next = after;
+        let follows = next.filter(|&next| next == begin);
+        next = follows.and_then(|next| next.checked_add(count));
     }
-    if next == end {
+    if next == Some(end) {
         return Ok(());
     }
     Err(Error::Incomplete {
         what: "positions of a task's runs",
         expected: end - first,
-        found: next - first,
+        found: runs.iter().fold(0, |sum, r| r.count.saturating_add(sum)),
     })
 }
 
