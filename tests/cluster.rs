@@ -1,9 +1,22 @@
 //! The same job gives the same bytes: in one process with any number of threads, on any number of
-//! workers, started by `run` or by hand, by any method.
+//! workers, started by `run` or by hand, however they come by the part, by any method.
 
 mod common;
 
-use common::{data, job, master, path_of, report, sample, scratch, succeed, text, worker};
+use std::path::Path;
+
+use common::{data, job, master, path_of, report, run, sample, scratch, succeed};
+use common::{text, texts, worker};
+use serde_json::Value;
+
+const LAST_WITHOUT_AXIS: &str = "[cutter]
+kind = \"torus\"
+major_radius = 40.0
+minor_radius = 8.0
+[motion]
+step = 2.0
+points_per_revolution = 36
+";
 
 const LAST: &str = "axis = { point = [0, 0, 14], direction = [1, 0, 0] }
 [cutter]
@@ -15,24 +28,62 @@ step = 2.0
 points_per_revolution = 360
 ";
 
-/// Any number of workers, against one process.
-fn check_workers(job: &std::path::Path) {
-    let dir = scratch();
-    let alone = path_of(job, dir.path(), "alone", &[]);
-    for count in [1, 2, 3, 5, 8] {
-        let name = format!("{count}");
-        let path = path_of(job, dir.path(), &name, &["--workers", &name]);
-        assert!(path == alone, "{} on {count} workers", job.display());
-        let report = report(&dir.path().join(&name));
-        let extents = report["extents"].as_array().expect("extents");
-        assert_eq!(extents.len(), count, "each worker had its extent");
-        assert_eq!(report["lost"].as_array().map(Vec::len), Some(0));
+const DISTRIBUTIONS: [&str; 3] = ["overlap", "halo", "surface"];
+
+/// Any number of workers, however they come by the part, against one process.
+fn check_workers(job: &Path, distributions: &[&str], counts: &[usize]) {
+    for contact in ["facet", "point"] {
+        let dir = scratch();
+        let contact = ["--contact", contact];
+        let alone = path_of(job, dir.path(), "alone", &contact);
+        for distribution in distributions {
+            for count in counts {
+                let name = format!("{distribution}-{count}");
+                let workers = count.to_string();
+                let args = ["--workers", &workers, "--distribution", distribution];
+                let path = path_of(job, dir.path(), &name, &[&args, &contact[..]].concat());
+                assert!(path == alone, "{} on {name}, {contact:?}", job.display());
+                let report = report(&dir.path().join(&name));
+                assert_eq!(report["job"]["cluster"]["distribution"], *distribution);
+                let extents = report["extents"].as_array().expect("extents");
+                assert_eq!(extents.len(), *count, "each worker had its extent");
+                assert_eq!(report["lost"].as_array().map(Vec::len), Some(0));
+                check_traffic(distribution, &report);
+            }
+        }
+    }
+}
+
+/// What travels is what the distribution promises, by the report.
+fn check_traffic(distribution: &str, report: &Value) {
+    let extents = report["extents"].as_array().expect("extents");
+    let traffic = &report["traffic"];
+    let number = |of: &Value, key: &str| of[key].as_u64().expect("a number");
+    let sum = |key: &str| extents.iter().map(|e| number(e, key)).sum::<u64>();
+    let [needed, sent] = ["rows_needed", "rows_sent"].map(|key| number(traffic, key));
+    let [total, halo] = ["rows", "halo_rows"].map(sum);
+    assert_eq!(total, needed + halo, "every row has one owner");
+    let fetched = number(traffic, "bytes_between_workers");
+    match distribution {
+        "overlap" => assert_eq!((sent, fetched), (total, 0), "rows travel with their halo"),
+        "halo" => {
+            assert_eq!(sent, needed, "no row is sent twice");
+            assert_eq!(fetched > 0, halo > 0, "the halo is fetched");
+        }
+        _ => assert_eq!((sent, fetched), (0, 0), "surfaces travel, not rows"),
+    }
+    for e in extents {
+        let seconds = |key: &str| e[key].as_f64().expect("a number");
+        let phases = ["receive", "make", "halo", "build", "digitize"];
+        let phases = phases.map(|phase| seconds(&format!("{phase}_seconds")));
+        let all = phases.iter().sum::<f64>();
+        assert!(all <= seconds("seconds"), "phases follow each other: {e}");
     }
 }
 
 #[test]
 fn the_sample_is_the_same_on_any_number_of_workers() {
-    check_workers(&sample());
+    check_workers(&sample(), &DISTRIBUTIONS, &[1, 2, 3, 5, 8, 16]);
 }
 
 #[test]
@@ -41,7 +92,8 @@ fn surfaces_are_the_same_on_any_number_of_workers() {
         return;
     };
     let dir = scratch();
-    check_workers(&job(dir.path(), "job.toml", &[&part], LAST));
+    let job = job(dir.path(), "job.toml", &[&part], LAST);
+    check_workers(&job, &DISTRIBUTIONS, &[1, 3, 8]);
 }
 
 #[test]
@@ -50,7 +102,68 @@ fn a_mesh_is_the_same_on_any_number_of_workers() {
         return;
     };
     let dir = scratch();
-    check_workers(&job(dir.path(), "job.toml", &[&part], LAST));
+    let job = job(dir.path(), "job.toml", &[&part], LAST);
+    check_workers(&job, &["overlap", "halo"], &[1, 2, 5, 16]);
+}
+
+/// Over a grid of more than half a million points the surfaces are next to nothing.
+#[test]
+fn surfaces_take_less_than_a_hundredth_of_the_bytes_of_their_points() {
+    let dir = scratch();
+    let part = sample().with_file_name("last.step");
+    let more = "[discretization]\ngrid = { rows = 700, columns = 500 }
+[cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
+[motion]\nstep = 10.0\npoints_per_revolution = 60\n";
+    let job = job(dir.path(), "job.toml", &[&part], more);
+    let bytes = DISTRIBUTIONS.map(|distribution| {
+        let args = ["--workers", "4", "--distribution", distribution];
+        let path = path_of(&job, dir.path(), distribution, &args);
+        let report = report(&dir.path().join(distribution));
+        let points = report["bodies"].as_array().expect("bodies").iter();
+        let points: u64 = points.filter_map(|b| b["points"].as_u64()).sum();
+        assert!(points >= 500_000, "{points}");
+        let traffic = &report["traffic"];
+        let bytes = traffic["bytes_to_workers"].as_u64().expect("a number");
+        (path, bytes)
+    });
+    let [(path, overlap), (by_halo, halo), (by_surface, surface)] = bytes;
+    assert!(path == by_halo && path == by_surface);
+    assert!(halo < overlap, "{halo} {overlap}");
+    assert!(100 * surface < overlap, "{surface} {overlap}");
+}
+
+#[test]
+fn a_mesh_has_no_surfaces_to_send() {
+    let dir = scratch();
+    let mesh = dir.path().join("mesh.obj");
+    std::fs::write(&mesh, "v 0 0 0\nv 10 0 0\nv 0 5 0\nf 1 2 3\n").expect("writable");
+    let job = job(dir.path(), "job.toml", &[&mesh], LAST_WITHOUT_AXIS);
+    let (master, address) = master(&[]);
+    let _worker = worker(&address, "a");
+    let out = dir.path().join("out");
+    for more in [
+        &["run", "--workers", "2"][..],
+        &["submit", "--master", &address],
+    ] {
+        let (command, flags) = more.split_first().expect("a command");
+        let mut args = vec![
+            *command,
+            text(&job),
+            "-o",
+            text(&out),
+            "--distribution",
+            "surface",
+        ];
+        args.extend(flags);
+        let refused = run(&args);
+        let (_, err) = texts(&refused);
+        assert_eq!(refused.status.code(), Some(2), "{err}");
+        assert!(
+            err.contains("is a mesh") && err.contains("overlap or halo"),
+            "{err}"
+        );
+    }
+    drop(master);
 }
 
 /// Positions inserted between others, by any number of processes and threads, and through a master.
@@ -130,7 +243,9 @@ fn every_kind_of_job_is_the_same_by_brute_force_and_on_workers() {
             let job = job(dir.path(), &format!("{name}.toml"), &[&part], &more);
             let alone = path_of(&job, dir.path(), &name, &["--threads", "1"]);
             let brute = ["--method", "brute"];
-            let others: [&[&str]; 3] = [&brute, &["--threads", "2"], &["--workers", "7"]];
+            let distribution = DISTRIBUTIONS[i % 3];
+            let workers = ["--workers", "7", "--distribution", distribution];
+            let others: [&[&str]; 3] = [&brute, &["--threads", "2"], &workers];
             for args in others {
                 let other = path_of(&job, dir.path(), &name, args);
                 assert!(alone == other, "{name} {args:?}");
@@ -162,7 +277,8 @@ fn a_cluster_made_by_hand_gives_the_same_bytes() {
     let alone = path_of(&sample(), dir.path(), "alone", &[]);
     let (_master, address) = master(&[]);
     let _workers = ["a", "b"].map(|id| worker(&address, id));
-    for name in ["first", "second"] {
+    for name in ["overlap", "halo", "surface", "halo again"] {
+        let distribution = name.split(' ').next().expect("a word");
         let out = dir.path().join(name);
         let sample = sample();
         succeed(&[
@@ -172,6 +288,8 @@ fn a_cluster_made_by_hand_gives_the_same_bytes() {
             &address,
             "-o",
             text(&out),
+            "--distribution",
+            distribution,
             "-q",
         ]);
         assert!(std::fs::read(out.join("path.csv")).expect("a path") == alone);
@@ -183,5 +301,6 @@ fn a_cluster_made_by_hand_gives_the_same_bytes() {
             .map(|w| w["worker"].as_str().expect("a name"))
             .collect();
         assert_eq!(workers, ["a", "b"]);
+        check_traffic(distribution, &report);
     }
 }

@@ -2,6 +2,8 @@
 //! proves that its fault was there.
 
 mod common;
+#[path = "faults/halo.rs"]
+mod halo;
 
 use std::path::{Path, PathBuf};
 
@@ -188,11 +190,12 @@ fn an_interrupt_stops_a_run_and_its_workers() {
 /// A worker that sends positions which cannot be right, in one of several ways.
 struct Liar(Lie);
 
-type Lie = fn(wire::Task) -> DigitizeReply;
+type Lie = fn(wire::Task) -> Vec<DigitizeReply>;
 
 #[tonic::async_trait]
 impl Worker for Liar {
     type DigitizeStream = tokio_stream::Iter<std::vec::IntoIter<Result<DigitizeReply, Status>>>;
+    type FetchRowsStream = tokio_stream::Empty<Result<wire::Chunk, Status>>;
 
     async fn digitize(
         &self,
@@ -205,8 +208,23 @@ impl Worker for Liar {
                 task = Some(header);
             }
         }
-        let reply = (self.0)(task.expect("a task comes first"));
-        Ok(Response::new(tokio_stream::iter(vec![Ok(reply)])))
+        let replies = (self.0)(task.expect("a task comes first"));
+        let replies: Vec<_> = replies.into_iter().map(Ok).collect();
+        Ok(Response::new(tokio_stream::iter(replies)))
+    }
+
+    async fn place(
+        &self,
+        _: Request<Streaming<wire::PlaceRequest>>,
+    ) -> Result<Response<wire::PlaceReply>, Status> {
+        Err(Status::unimplemented("a liar holds nothing"))
+    }
+
+    async fn fetch_rows(
+        &self,
+        _: Request<wire::FetchRequest>,
+    ) -> Result<Response<Self::FetchRowsStream>, Status> {
+        Err(Status::unimplemented("a liar holds nothing"))
     }
 }
 
@@ -241,7 +259,7 @@ async fn register(
     client.register(request).await
 }
 
-fn positions(task: wire::Task, skip: u64, count: u64) -> DigitizeReply {
+fn positions(task: &wire::Task, skip: u64, count: u64) -> DigitizeReply {
     let touches = vec![None; count as usize];
     let positions = horma_proto::pack_positions(task.first + skip, &touches, &[]);
     DigitizeReply {
@@ -251,7 +269,7 @@ fn positions(task: wire::Task, skip: u64, count: u64) -> DigitizeReply {
 }
 
 /// The first position of a task, and one inserted on the move from it or from another.
-fn inserted(task: wire::Task, from: u64) -> DigitizeReply {
+fn inserted(task: &wire::Task, from: u64) -> DigitizeReply {
     let index = horma_core::Index::between(task.first + from, 512);
     let between = [horma_core::Inserted {
         index: index.expect("between"),
@@ -266,31 +284,43 @@ fn inserted(task: wire::Task, from: u64) -> DigitizeReply {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn workers_that_answer_wrongly_are_found_out() {
-    let lies: [(&str, Lie); 7] = [
+    let lies: [(&str, Lie); 8] = [
         ("checksum", |task| {
-            let mut reply = positions(task, 0, 10);
+            let mut reply = positions(&task, 0, 10);
             if let Some(Kind::Positions(p)) = &mut reply.kind {
                 p.crc32c ^= 1;
             }
-            reply
+            vec![reply]
         }),
-        ("was next", |task| positions(task, 1, 10)),
-        ("were left", |task| {
+        ("twice", |task| {
+            vec![positions(&task, 5, 10), positions(&task, 0, 6)]
+        }),
+        ("but its extent has", |task| {
             let too_many = task.count + 1;
-            positions(task, 0, too_many)
+            vec![positions(&task, 0, too_many)]
         }),
-        ("nobody asked for", |task| inserted(task, 0)),
-        ("was inserted after", |task| inserted(task, 1)),
+        ("nobody asked for", |task| vec![inserted(&task, 0)]),
+        ("was inserted after", |task| vec![inserted(&task, 1)]),
         ("it speaks of", |task| {
-            let mut reply = positions(task, 0, 10);
+            let mut reply = positions(&task, 0, 10);
             if let Some(id) = &mut reply.id {
                 id.attempt += 1;
             }
-            reply
+            vec![reply]
         }),
-        ("positions left", |task| DigitizeReply {
-            id: task.id,
-            kind: Some(Kind::Finished(wire::Finished::default())),
+        ("positions left", |task| {
+            vec![DigitizeReply {
+                id: task.id,
+                kind: Some(Kind::Finished(wire::Finished::default())),
+            }]
+        }),
+        ("it asked for the rows of", |task| {
+            let source = task.id;
+            let reason = String::new();
+            vec![DigitizeReply {
+                id: task.id,
+                kind: Some(Kind::HaloLost(wire::HaloLost { source, reason })),
+            }]
         }),
     ];
     let dir = scratch();

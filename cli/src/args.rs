@@ -280,7 +280,8 @@ pub(crate) struct Job {
         help_heading = "Instead of the job file's"
     )]
     pub clearance: Option<f64>,
-    /// How the part reaches the workers: overlap
+    /// How workers come by the part: overlap (the master sends each what it needs), halo (each row is
+    /// sent once, workers fetch the rest from each other) or surface (workers make the points)
     #[arg(
         long,
         env = "HORMA_DISTRIBUTION",

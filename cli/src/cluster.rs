@@ -4,7 +4,7 @@
 use std::process::Stdio;
 use std::time::Duration;
 
-use horma_core::{Job, Part, Simd};
+use horma_core::{Distribution, Job, Part, Simd};
 use horma_master::{Config, Outcome, Progress};
 use tokio::net::TcpListener;
 use tokio::process::{Child, Command};
@@ -29,6 +29,7 @@ const WORKER_PATIENCE: &str = "5";
 pub(crate) async fn run(
     part: Part,
     job: Job,
+    distribution: Distribution,
     workers: u32,
     threads: usize,
     simd: Simd,
@@ -48,6 +49,7 @@ pub(crate) async fn run(
         memory: system::memory(),
         // Master and workers talk within this machine.
         tls: None,
+        workers_here: true,
     };
     let shutdown = CancellationToken::new();
     let _stopped = shutdown.clone().drop_guard();
@@ -64,7 +66,7 @@ pub(crate) async fn run(
         });
     }
     everybody_there(&mut children, master.workers()).await?;
-    Ok(master.run(part, job, 1, progress).await?)
+    Ok(master.run(part, job, distribution, 1, progress).await?)
 }
 
 /// Waits until every child that lives has registered.

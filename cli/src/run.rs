@@ -31,6 +31,7 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
             let threads = args.threads.map(usize::from);
             let simd = args.simd.unwrap_or_else(Simd::best);
             let (workers, job) = (file.cluster.workers, file.job);
+            let distribution = file.cluster.distribution;
             if workers == 0 {
                 let threads = threads.unwrap_or_else(system::cores);
                 let run = move || here::run(&part, job, threads, simd, &display, &stop);
@@ -38,7 +39,8 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
                 return run.await.unwrap_or(Err(Error::Interrupted));
             }
             let progress = progress(display);
-            cluster::run(part, job, workers, threads.unwrap_or(1), simd, progress).await
+            let threads = threads.unwrap_or(1);
+            cluster::run(part, job, distribution, workers, threads, simd, progress).await
         },
     )
 }
@@ -52,8 +54,17 @@ pub(crate) fn submit(args: &args::Submit) -> Result<()> {
         {
             return Err(Error::OneProcess);
         }
+        let distribution = file.cluster.distribution;
         let (job, progress) = (file.job, progress(display));
-        submit::run(part, job, &args.master, tls.as_ref(), progress).await
+        submit::run(
+            part,
+            job,
+            distribution,
+            &args.master,
+            tls.as_ref(),
+            progress,
+        )
+        .await
     })
 }
 

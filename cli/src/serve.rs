@@ -29,6 +29,7 @@ pub(crate) fn master(args: &Master) -> Result<()> {
         max_part: args.max_part.saturating_mul(1_000_000),
         memory: system::memory(),
         tls,
+        workers_here: false,
     };
     serve(async {
         let listener = listen(&args.bind, trusted).await?;

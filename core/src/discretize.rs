@@ -7,12 +7,12 @@
 use std::collections::HashMap;
 
 use crate::error::{Error, Result};
-use crate::evaluate::{Isoline, Isolines, Net};
+use crate::grid::SurfaceGrid;
 use crate::job::Discretization;
 use crate::part::{Body, Mesh, Part, Shape};
 use crate::record::BodyRecord;
 use crate::refine::refine;
-use crate::row::{Facet, Outline, Row, RowKind, facets, outlines};
+use crate::row::{Facet, Outline, Row, RowKind, facets, join};
 use crate::surface::{Direction, Surface};
 use crate::vector::{Interval, Point};
 
@@ -90,33 +90,62 @@ fn layout_body(body: &Body, discretization: Discretization) -> Result<Layout<'_>
 
 /// Makes the rows that were laid out.
 pub(crate) fn fill(bodies: &[Layout]) -> Model {
-    let mut model = Model::default();
+    let mut rows = Vec::new();
+    let survey = survey(bodies, |row| rows.push(row));
+    Model {
+        rows,
+        outlines: survey.outlines,
+        bodies: survey.bodies,
+    }
+}
+
+/// What a plan has to know of rows that need not be there.
+pub(crate) struct Survey {
+    pub outlines: Vec<Outline>,
+    pub bodies: Vec<BodyRecord>,
+    pub grids: Vec<SurfaceGrid>,
+}
+
+/// Makes the rows that were laid out, one after the other, and leaves them to `take`.
+pub(crate) fn survey(bodies: &[Layout], mut take: impl FnMut(Row)) -> Survey {
+    let mut survey = Survey {
+        outlines: Vec::new(),
+        bodies: Vec::new(),
+        grids: Vec::new(),
+    };
     for body in bodies {
-        let first_row = model.rows.len();
+        let first = survey.outlines.len() as u32;
+        let mut outlines = Vec::new();
+        let mut add = |row: Row| {
+            outlines.push(row.outline());
+            take(row);
+        };
         let (name, columns, deviation) = match body {
             Layout::Mesh(name, mesh) => {
-                add_slabs(&mut model.rows, mesh);
+                slabs(mesh, first).for_each(add);
                 (name, None, None)
             }
-            Layout::Grid(name, surface, grid) => {
-                add_isolines(&mut model.rows, surface, grid);
-                (name, Some(grid.vs.len() as u32), grid.deviation)
+            Layout::Grid(name, surface, lines) => {
+                let grid = SurfaceGrid::whole(name, surface, lines, first);
+                grid.rows(&mut add);
+                survey.grids.push(grid);
+                (name, Some(lines.vs.len() as u32), lines.deviation)
             }
         };
-        let rows = outlines(&model.rows[first_row..]);
-        let x = rows.iter().fold(Interval::EMPTY, |x, r| x.hull(r.x));
-        model.bodies.push(BodyRecord {
+        join(&mut outlines);
+        let x = outlines.iter().fold(Interval::EMPTY, |x, r| x.hull(r.x));
+        survey.bodies.push(BodyRecord {
             name: (*name).to_owned(),
-            rows: rows.len() as u32,
+            rows: outlines.len() as u32,
             columns,
-            points: rows.iter().map(|r| r.points).sum(),
-            facets: rows.iter().map(|r| r.facets).sum(),
+            points: outlines.iter().map(|r| r.points).sum(),
+            facets: outlines.iter().map(|r| r.facets).sum(),
             x: [x.low, x.high],
             deviation,
         });
-        model.outlines.extend(rows);
+        survey.outlines.extend(outlines);
     }
-    model
+    survey
 }
 
 /// The parameters of a grid's lines.
@@ -156,31 +185,16 @@ fn evenly(direction: &Direction, n: usize) -> Vec<f64> {
     inner.chain([high]).collect()
 }
 
-fn add_isolines(rows: &mut Vec<Row>, surface: &Surface, grid: &Lines) {
-    let net = Net::new(surface);
-    let isolines = Isolines::new(&net, &grid.vs);
-    let mut line = Isoline::default();
-    let last = grid.us.len() - 1;
-    for (i, &u) in grid.us.iter().enumerate() {
-        isolines.at(u, &mut line);
-        let points = (0..grid.vs.len()).map(|j| line.points.point(j));
-        rows.push(Row {
-            id: rows.len() as u32,
-            points: points.collect(),
-            kind: RowKind::Isoline {
-                joins_next: i < last,
-            },
-        });
-    }
-}
-
-fn add_slabs(rows: &mut Vec<Row>, mesh: &Mesh) {
+/// The slabs of a mesh, their ids counted on from `first`.
+fn slabs(mesh: &Mesh, first: u32) -> impl Iterator<Item = Row> {
     let vertex = |v: u32| mesh.vertices()[v as usize];
     let middle = |t: &[u32; 3]| t.iter().map(|&v| vertex(v)[0]).sum::<f64>();
-    let mut order: Vec<&[u32; 3]> = mesh.triangles().iter().collect();
+    let mut order: Vec<[u32; 3]> = mesh.triangles().to_vec();
     // The sort is stable, so triangles at the same place stay in file order.
     order.sort_by(|a, b| middle(a).total_cmp(&middle(b)));
-    for slab in order.chunks(SLAB_FACETS) {
+    let count = order.len().div_ceil(SLAB_FACETS);
+    (0..count).map(move |i| {
+        let slab = &order[i * SLAB_FACETS..order.len().min((i + 1) * SLAB_FACETS)];
         let mut points: Vec<Point> = Vec::new();
         let mut local = HashMap::new();
         let facets = slab.iter().map(|t| {
@@ -192,12 +206,12 @@ fn add_slabs(rows: &mut Vec<Row>, mesh: &Mesh) {
             })
         });
         let facets = facets.collect();
-        rows.push(Row {
-            id: rows.len() as u32,
+        Row {
+            id: first + i as u32,
             points,
             kind: RowKind::Slab { facets },
-        });
-    }
+        }
+    })
 }
 
 #[cfg(test)]

@@ -71,6 +71,14 @@ pub enum Error {
         /// Name of the mesh.
         name: String,
     },
+    /// Workers that make their rows from surfaces where there are none.
+    #[error(
+        "{name} is a mesh, but the distribution surface needs surfaces, from which workers make their rows; choose overlap or halo"
+    )]
+    SurfaceNeedsSurfaces {
+        /// Name of the mesh.
+        name: String,
+    },
     /// Windows around the last winner over facets.
     #[error(
         "the local search is over points, as in the papers; set contact to point, or choose the exact one"

@@ -5,6 +5,9 @@
 //! Where positions are inserted an extent owns the moves that begin at its positions, and also needs
 //! what is in reach from the one that the last of them ends at.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
+
 use crate::job::{Job, Method};
 use crate::motion::Trajectory;
 use crate::row::Outline;
@@ -12,7 +15,7 @@ use crate::tolerance::REACH_SLACK;
 use crate::vector::Interval;
 
 /// A run of positions and the rows in reach from them.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Extent {
     /// Number of the extent in the job.
     pub id: u32,
@@ -22,6 +25,41 @@ pub struct Extent {
     pub count: u64,
     /// Ids of the rows it needs, in order.
     pub rows: Vec<u32>,
+    /// Of these, the ones it owns. Every row that any extent needs is owned by one that does.
+    pub own: Vec<u32>,
+    /// The rest of these, by their owners.
+    pub halo: Vec<Halo>,
+}
+
+/// Rows that an extent needs and another one owns.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Halo {
+    /// The owner.
+    pub extent: u32,
+    /// Ids of the rows, in order.
+    pub rows: Vec<u32>,
+}
+
+/// Positions that are digitized together, and the rows that this takes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Run {
+    /// Index of the first position.
+    pub first: u64,
+    /// Number of positions.
+    pub count: u64,
+    /// Ids of the rows they need, in order.
+    pub rows: Vec<u32>,
+}
+
+impl Extent {
+    /// All of it as one run.
+    pub fn whole(&self) -> Run {
+        Run {
+            first: self.first,
+            count: self.count,
+            rows: self.rows.clone(),
+        }
+    }
 }
 
 /// Places at which the predicted work is looked at.
@@ -56,23 +94,132 @@ pub fn split(trajectory: &Trajectory, outlines: &[Outline], job: &Job, parts: u3
     cuts.insert(0, 0);
     cuts.push(trajectory.positions);
     cuts.dedup();
-    // Where the last moves of an extent end.
-    let seen = |end: u64| match job.motion.path_tolerance {
+    let extent = |(id, ends): (u32, &[u64])| {
+        let (first, count) = (ends[0], ends[1] - ends[0]);
+        Extent {
+            id,
+            first,
+            count,
+            rows: rows_within(outlines, seen(trajectory, job, first, count).widened(w)),
+            ..Extent::default()
+        }
+    };
+    let mut extents: Vec<Extent> = (0..).zip(cuts.windows(2)).map(extent).collect();
+    give_to_owners(&mut extents, outlines, trajectory);
+    extents
+}
+
+/// The travel of positions, and of the one that their last move ends at where positions are inserted.
+fn seen(trajectory: &Trajectory, job: &Job, first: u64, count: u64) -> Interval {
+    let end = first + count;
+    let end = match job.motion.path_tolerance {
         Some(_) => trajectory.positions.min(end + 1),
         None => end,
     };
-    (0..)
-        .zip(cuts.windows(2))
-        .map(|(id, ends)| {
-            let travel = trajectory.travel_of(ends[0], seen(ends[1]) - ends[0]);
-            Extent {
-                id,
-                first: ends[0],
-                count: ends[1] - ends[0],
-                rows: rows_within(outlines, travel.widened(w)),
+    trajectory.travel_of(first, end - first)
+}
+
+/// Gives each row to that of the extents that need it to which its middle is nearest.
+fn give_to_owners(extents: &mut [Extent], outlines: &[Outline], trajectory: &Trajectory) {
+    let mut owners: Vec<Option<(f64, u32)>> = vec![None; outlines.len()];
+    for extent in &*extents {
+        let travel = trajectory.travel_of(extent.first, extent.count);
+        for &row in &extent.rows {
+            let x = outlines[row as usize].x;
+            let middle = (x.low + x.high) / 2.0;
+            let away = (travel.low - middle).max(middle - travel.high).max(0.0);
+            let owner = &mut owners[row as usize];
+            if owner.is_none_or(|(least, _)| away < least) {
+                *owner = Some((away, extent.id));
             }
-        })
-        .collect()
+        }
+    }
+    for extent in extents {
+        let mut halo: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for &row in &extent.rows {
+            match owners[row as usize] {
+                Some((_, owner)) if owner != extent.id => halo.entry(owner).or_default().push(row),
+                _ => extent.own.push(row),
+            }
+        }
+        let halo = halo.into_iter();
+        extent.halo = halo.map(|(extent, rows)| Halo { extent, rows }).collect();
+    }
+}
+
+/// A second hierarchy pays if this share of the positions need not wait for it.
+const WORTH_IT: f64 = 0.25;
+
+/// The longest run of an extent's positions that need only its own rows, then what is before and what
+/// is after it; all of it as one run if that would be too short to be worth it.
+pub(crate) fn interior_first(
+    trajectory: &Trajectory,
+    outlines: &[Outline],
+    job: &Job,
+    extent: &Extent,
+) -> Vec<Run> {
+    let w = job.cutter.half_width() + REACH_SLACK;
+    let (begin, end) = (extent.first, extent.first + extent.count);
+    // Positions from which each row of the halo is in reach; travel never decreases.
+    let mut edges: Vec<(u64, u64)> = Vec::new();
+    for &row in extent.halo.iter().flat_map(|h| &h.rows) {
+        let before = (row as usize).checked_sub(1).map(|i| outlines[i]);
+        let strip = before.filter(|o| o.joins_next).map(|o| o.x);
+        let x = strip.map_or(outlines[row as usize].x, |s| {
+            s.hull(outlines[row as usize].x)
+        });
+        let clear = |i| seen(trajectory, job, i, 1).high + w < x.low;
+        let from = partition(begin, end, clear);
+        let to = partition(begin, end, |i| trajectory.travel(i) - w <= x.high);
+        edges.push((from, to));
+    }
+    edges.sort_unstable();
+    let (mut interior, mut next) = (begin..begin, begin);
+    for (from, to) in edges.into_iter().chain([(end, end)]) {
+        if from.saturating_sub(next) > interior.end - interior.start {
+            interior = next..from;
+        }
+        next = next.max(to);
+    }
+    let run = |positions: Range<u64>| Run {
+        first: positions.start,
+        count: positions.end - positions.start,
+        rows: rows_within(
+            outlines,
+            seen(
+                trajectory,
+                job,
+                positions.start,
+                positions.end - positions.start,
+            )
+            .widened(w),
+        ),
+    };
+    let inner = run(interior.clone());
+    let needs_no_others = inner
+        .rows
+        .iter()
+        .all(|r| extent.own.binary_search(r).is_ok());
+    if !needs_no_others || (inner.count as f64) < WORTH_IT * extent.count as f64 {
+        return vec![extent.whole()];
+    }
+    let around = [begin..interior.start, interior.end..end].map(run);
+    let around = around.into_iter().filter(|run| run.count > 0);
+    std::iter::once(inner).chain(around).collect()
+}
+
+/// The first of `begin..end` for which `holds` no longer does.
+fn partition(begin: u64, end: u64, holds: impl Fn(u64) -> bool) -> u64 {
+    let (mut low, mut high) = (begin, end);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if holds(middle) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    low
 }
 
 /// Predicted work of a position with so many candidates within the cutter's width. The exact
@@ -214,6 +361,59 @@ mod tests {
                 }
             }
             prop_assert_eq!(next, positions);
+        }
+
+        #[test]
+        fn every_row_that_is_needed_has_one_owner_and_the_interior_needs_no_other(
+            outlines in outlines(),
+            positions in 1..5000_u64,
+            parts in 1..20_u32,
+            radius in 0.5..30.0_f64,
+            between in any::<bool>(),
+        ) {
+            let job = job(radius, between.then_some(0.01));
+            let trajectory = Trajectory {
+                kind: MotionKind::Rings,
+                from: -5.0,
+                step: 3.0,
+                points_per_revolution: 40,
+                positions,
+            };
+            let extents = split(&trajectory, &outlines, &job, parts);
+            let sorted = |rows: &mut dyn Iterator<Item = u32>| {
+                let mut rows: Vec<u32> = rows.collect();
+                rows.sort_unstable();
+                rows
+            };
+            let owned = sorted(&mut extents.iter().flat_map(|e| e.own.clone()));
+            let mut needed = sorted(&mut extents.iter().flat_map(|e| e.rows.clone()));
+            needed.dedup();
+            prop_assert_eq!(owned, needed);
+            for e in &extents {
+                let halo = e.halo.iter().flat_map(|h| h.rows.clone());
+                prop_assert_eq!(&sorted(&mut e.own.iter().copied().chain(halo)), &e.rows);
+                for h in &e.halo {
+                    let owner = &extents[h.extent as usize];
+                    prop_assert!(h.extent != e.id && !h.rows.is_empty());
+                    prop_assert!(h.rows.iter().all(|r| owner.own.contains(r)));
+                }
+                let mut runs = interior_first(&trajectory, &outlines, &job, e);
+                if runs.len() > 1 {
+                    prop_assert!(runs[0].rows.iter().all(|r| e.own.contains(r)));
+                }
+                runs.sort_by_key(|r| r.first);
+                let mut next = e.first;
+                for run in runs {
+                    prop_assert_eq!(run.first, next);
+                    prop_assert!(run.count > 0);
+                    next += run.count;
+                    let within = seen(&trajectory, &job, run.first, run.count);
+                    let within = within.widened(job.cutter.half_width() + REACH_SLACK);
+                    prop_assert_eq!(&run.rows, &rows_within(&outlines, within));
+                    prop_assert!(run.rows.iter().all(|r| e.rows.contains(r)));
+                }
+                prop_assert_eq!(next, e.first + e.count);
+            }
         }
     }
 

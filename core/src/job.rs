@@ -78,6 +78,20 @@ impl Discretization {
 /// Finest chordal tolerance, mm: a nanometre, far below any lathe.
 const MIN_TOLERANCE: f64 = 1.0e-6;
 
+/// How workers come by the rows that their positions need. The path does not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Distribution {
+    /// The master sends each worker its rows and those of others that its cutter reaches: the first
+    /// architecture of the 2001 paper. Rows that several need travel as often.
+    #[default]
+    Overlap,
+    /// The master sends each row once, to the worker that owns it, and workers fetch the rest from
+    /// each other: the paper's second architecture.
+    Halo,
+    /// The master sends surfaces and the parameters of their rows, and workers make the points.
+    Surface,
+}
+
 /// What the cutter touches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Contact {

@@ -23,6 +23,7 @@ mod motion;
 mod refine;
 
 mod discretize;
+mod grid;
 mod row;
 
 mod extent;
@@ -55,14 +56,16 @@ pub use cutter::Cutter;
 pub use digitize::{Digitizer, Heuristic};
 pub use discretize::{Model, discretize};
 pub use error::{Error, Result};
-pub use extent::Extent;
-pub use job::{Contact, Culling, Discretization, Job, Local, Method, Window};
+pub use extent::{Extent, Halo, Run};
+pub use grid::SurfaceGrid;
+pub use job::{Contact, Culling, Discretization, Distribution, Job, Local, Method, Window};
 pub use motion::{Index, Motion, MotionKind, Trajectory};
 pub use part::{Body, Mesh, Part, Shape};
 pub use path::{Inserted, SubTrajectory, ToolPath, Touch, Waypoint, stitch};
 pub use placement::{Axis, place};
-pub use plan::Plan;
-pub use record::{BodyRecord, Counters, ExtentRecord, LostAttempt, Phase, Record, WorkerRecord};
+pub use plan::{Handout, Plan, Stock};
+pub use record::{BodyRecord, Counters, ExtentRecord, LostAttempt, Phase, Record};
+pub use record::{Traffic, WorkerRecord};
 pub use row::{Outline, Row, RowKind};
 pub use simd::Simd;
 pub use surface::{Direction, MAX_DEGREE, Surface};

@@ -1,11 +1,14 @@
 //! The plan: everything that follows from a part and a job before the first position is digitized.
 
-use crate::discretize::{Layout, Model, fill, layout};
+use crate::discretize::{Layout, Model, fill, layout, survey};
 use crate::error::{Error, Result};
-use crate::extent::{Extent, split};
-use crate::job::{Discretization, Job, Method};
+use crate::extent::{Extent, Run, interior_first, split};
+use crate::grid::SurfaceGrid;
+use crate::job::{Discretization, Distribution, Job, Method};
 use crate::motion::Trajectory;
-use crate::part::{Body, Part, Shape};
+use crate::part::{Part, Shape};
+use crate::record::BodyRecord;
+use crate::row::{Outline, Row};
 use crate::vector::Interval;
 
 /// A job ready to be digitized, here or elsewhere.
@@ -38,40 +41,14 @@ impl Plan {
     /// [`Error::OutOfMemory`] before anything large is tried; those of [`crate::discretize()`] and of
     /// [`crate::Motion::over`].
     pub fn new(part: &Part, job: Job, memory: u64) -> Result<Self> {
-        part.validate()?;
-        job.validate()?;
-        if let Method::Local(_) = job.method {
-            let mesh = part
-                .bodies
-                .iter()
-                .find(|b| matches!(b.shape, Shape::Mesh(_)));
-            if let Some(Body { name, .. }) = mesh {
-                return Err(Error::LocalNeedsGrids { name: name.clone() });
-            }
-        }
-        let half_width = job.cutter.half_width();
-        // The net of poles holds its surface, so this is an upper bound, and it costs nothing.
-        let upper = job.motion.over(hull(part), half_width)?;
-        check_memory(points(part, job.discretization), upper.positions, memory)?;
-        let layout = layout(part, job.discretization)?;
-        let points = layout.iter().map(Layout::points).sum();
-        check_memory(points, upper.positions, memory)?;
+        let (layout, needed) = lay_out(part, &job, memory, POINT_BYTES)?;
         let model = fill(&layout);
-        let x = model
-            .outlines
-            .iter()
-            .fold(Interval::EMPTY, |x, r| x.hull(r.x));
-        let trajectory = job.motion.over(x, half_width)?;
-        let left = memory as f64 - memory_for(points, trajectory.positions);
-        let most_inserted = match job.motion.path_tolerance {
-            Some(_) => (left / INSERTED_BYTES) as u64,
-            None => 0,
-        };
+        let trajectory = positions(&job, &model.outlines)?;
         Ok(Self {
             job,
             model,
             trajectory,
-            most_inserted,
+            most_inserted: most_inserted(&job, memory as f64 - needed),
         })
     }
 
@@ -80,11 +57,7 @@ impl Plan {
     /// # Errors
     /// [`Error::TooManyInserted`]
     pub fn check_inserted(&self, inserted: u64) -> Result<()> {
-        let limit = self.most_inserted;
-        if inserted > limit {
-            return Err(Error::TooManyInserted { limit });
-        }
-        Ok(())
+        check_inserted(inserted, self.most_inserted)
     }
 
     /// Cuts the positions into at most `parts` extents of about equal predicted work.
@@ -97,6 +70,157 @@ impl Plan {
         } = self;
         split(trajectory, &model.outlines, job, parts)
     }
+}
+
+/// A job ready to be handed out to workers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Handout {
+    /// What was asked for.
+    pub job: Job,
+    /// How workers come by their rows.
+    pub distribution: Distribution,
+    /// The positions.
+    pub trajectory: Trajectory,
+    /// The outline of each row.
+    pub outlines: Vec<Outline>,
+    /// What became of each body, in order.
+    pub bodies: Vec<BodyRecord>,
+    /// What rows are sent from.
+    pub stock: Stock,
+    /// How many positions may be inserted between them, as in [`Plan`].
+    pub most_inserted: u64,
+}
+
+/// What a master has of the rows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Stock {
+    /// All of them; row `i` has the id `i`.
+    Rows(Vec<Row>),
+    /// What they are made from, and none of their points.
+    Grids(Vec<SurfaceGrid>),
+}
+
+impl Handout {
+    /// Plans as [`Plan::new`] does. If the workers make the rows themselves, each is made here only
+    /// for its outline, and dropped; their memory counts if it is the same, `workers_here`.
+    ///
+    /// # Errors
+    /// Those of [`Plan::new`], and [`Error::SurfaceNeedsSurfaces`].
+    pub fn new(
+        part: &Part,
+        job: Job,
+        distribution: Distribution,
+        memory: u64,
+        workers_here: bool,
+    ) -> Result<Self> {
+        match distribution {
+            Distribution::Overlap | Distribution::Halo => {
+                let plan = Plan::new(part, job, memory)?;
+                Ok(Self {
+                    job,
+                    distribution,
+                    trajectory: plan.trajectory,
+                    outlines: plan.model.outlines,
+                    bodies: plan.model.bodies,
+                    stock: Stock::Rows(plan.model.rows),
+                    most_inserted: plan.most_inserted,
+                })
+            }
+            Distribution::Surface => {
+                if let Some(name) = mesh(part) {
+                    return Err(Error::SurfaceNeedsSurfaces { name });
+                }
+                let point_bytes = if workers_here { POINT_BYTES } else { 0.0 };
+                let (layout, needed) = lay_out(part, &job, memory, point_bytes)?;
+                let survey = survey(&layout, drop);
+                Ok(Self {
+                    job,
+                    distribution,
+                    trajectory: positions(&job, &survey.outlines)?,
+                    outlines: survey.outlines,
+                    bodies: survey.bodies,
+                    stock: Stock::Grids(survey.grids),
+                    most_inserted: most_inserted(&job, memory as f64 - needed),
+                })
+            }
+        }
+    }
+
+    /// Cuts the positions into at most `parts` extents of about equal predicted work.
+    pub fn split(&self, parts: u32) -> Vec<Extent> {
+        split(&self.trajectory, &self.outlines, &self.job, parts)
+    }
+
+    /// Whether so many inserted positions can be kept.
+    ///
+    /// # Errors
+    /// [`Error::TooManyInserted`]
+    pub fn check_inserted(&self, inserted: u64) -> Result<()> {
+        check_inserted(inserted, self.most_inserted)
+    }
+
+    /// The runs in which a worker digitizes an extent: what needs only the extent's own rows first, if
+    /// the others are fetched meanwhile.
+    pub fn runs(&self, extent: &Extent) -> Vec<Run> {
+        match self.distribution {
+            Distribution::Overlap | Distribution::Surface => vec![extent.whole()],
+            Distribution::Halo => {
+                interior_first(&self.trajectory, &self.outlines, &self.job, extent)
+            }
+        }
+    }
+}
+
+/// How many positions may be inserted if so many bytes are left.
+fn most_inserted(job: &Job, left: f64) -> u64 {
+    match job.motion.path_tolerance {
+        Some(_) => (left / INSERTED_BYTES) as u64,
+        None => 0,
+    }
+}
+
+fn check_inserted(inserted: u64, limit: u64) -> Result<()> {
+    if inserted > limit {
+        return Err(Error::TooManyInserted { limit });
+    }
+    Ok(())
+}
+
+/// Checks a job, that it fits its part, and that it fits into `memory` bytes, each point taking
+/// `point_bytes` of them; decides on the lines of every grid. Also tells how many bytes it takes.
+fn lay_out<'a>(
+    part: &'a Part,
+    job: &Job,
+    memory: u64,
+    point_bytes: f64,
+) -> Result<(Vec<Layout<'a>>, f64)> {
+    part.validate()?;
+    job.validate()?;
+    if let Method::Local(_) = job.method
+        && let Some(name) = mesh(part)
+    {
+        return Err(Error::LocalNeedsGrids { name });
+    }
+    // The net of poles holds its surface, so this is an upper bound, and it costs nothing.
+    let upper = job.motion.over(hull(part), job.cutter.half_width())?;
+    let check = |points| check_memory(points, point_bytes, upper.positions, memory);
+    check(points(part, job.discretization))?;
+    let layout = layout(part, job.discretization)?;
+    let needed = check(layout.iter().map(Layout::points).sum())?;
+    Ok((layout, needed))
+}
+
+/// The positions over rows of these outlines.
+fn positions(job: &Job, outlines: &[Outline]) -> Result<Trajectory> {
+    let x = outlines.iter().fold(Interval::EMPTY, |x, r| x.hull(r.x));
+    job.motion.over(x, job.cutter.half_width())
+}
+
+/// The name of the first mesh.
+fn mesh(part: &Part) -> Option<String> {
+    let mut bodies = part.bodies.iter();
+    let mesh = bodies.find(|b| matches!(b.shape, Shape::Mesh(_)));
+    mesh.map(|b| b.name.clone())
 }
 
 /// Extent along the spindle of poles and vertices.
@@ -123,8 +247,8 @@ fn points(part: &Part, discretization: Discretization) -> f64 {
     points.sum()
 }
 
-fn check_memory(points: f64, positions: u64, available: u64) -> Result<()> {
-    let needed = memory_for(points, positions);
+fn check_memory(points: f64, point_bytes: f64, positions: u64, available: u64) -> Result<f64> {
+    let needed = points * point_bytes + positions as f64 * POSITION_BYTES;
     if needed > available as f64 {
         return Err(Error::OutOfMemory {
             points,
@@ -133,9 +257,5 @@ fn check_memory(points: f64, positions: u64, available: u64) -> Result<()> {
             available,
         });
     }
-    Ok(())
-}
-
-fn memory_for(points: f64, positions: u64) -> f64 {
-    points * POINT_BYTES + positions as f64 * POSITION_BYTES
+    Ok(needed)
 }

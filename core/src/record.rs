@@ -16,6 +16,8 @@ pub struct Record {
     pub counters: Counters,
     /// The windows of the local search.
     pub window: Option<Window>,
+    /// What the distribution cost in rows and bytes; nothing if it was one process.
+    pub traffic: Option<Traffic>,
     /// Who took part; nobody if it was one process.
     pub workers: Vec<WorkerRecord>,
     /// Each extent as it was delivered, in order.
@@ -87,6 +89,21 @@ impl std::ops::AddAssign for Counters {
     }
 }
 
+/// What travelled for the extents as they were delivered, by kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Traffic {
+    /// Rows that any extent needs, each counted once.
+    pub rows_needed: u64,
+    /// Rows that the master sent.
+    pub rows_sent: u64,
+    /// Bytes of tasks with their rows or surfaces, from the master to workers.
+    pub bytes_to_workers: u64,
+    /// Bytes of rows from worker to worker.
+    pub bytes_between_workers: u64,
+    /// Bytes of positions, from workers to the master.
+    pub bytes_of_results: u64,
+}
+
 /// Someone who took part.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WorkerRecord {
@@ -109,17 +126,31 @@ pub struct ExtentRecord {
     pub first: u64,
     /// Number of positions.
     pub positions: u64,
-    /// Rows sent, the overlap included.
+    /// Rows it needs, those of others included.
     pub rows: u32,
     /// Of these, how many other extents need too.
     pub overlap_rows: u32,
+    /// Of these, how many other extents own; fetched from their workers if that is the distribution.
+    pub halo_rows: u32,
+    /// Rows that the master sent for it, each as often as it was sent.
+    pub rows_sent: u64,
     /// Bytes from master to worker.
     pub bytes_sent: u64,
+    /// Bytes of rows from other workers.
+    pub bytes_fetched: u64,
     /// Bytes from worker to master.
     pub bytes_received: u64,
+    /// Wall time of sending its own rows ahead of all tasks, s.
+    pub place_seconds: f64,
     /// Wall time from sending the task to its last position, s.
     pub seconds: f64,
-    /// Of which the worker built its hierarchy, s.
+    /// Of which the worker received what came with the task, s.
+    pub receive_seconds: f64,
+    /// Of which it made rows from surfaces, s.
+    pub make_seconds: f64,
+    /// Of which it waited for rows of others with nothing else to do, s.
+    pub halo_seconds: f64,
+    /// Of which it built its hierarchies, s.
     pub build_seconds: f64,
     /// Of which it digitized, s.
     pub digitize_seconds: f64,

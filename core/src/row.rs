@@ -94,9 +94,20 @@ impl Row {
         u64::from(self.id) << 32 | i as u64
     }
 
-    /// Extent of the points along the spindle.
-    fn x(&self) -> Interval {
-        Interval::of(self.points.iter().map(|p| p[0]))
+    /// Its outline, but for the strip to the next row.
+    pub(crate) fn outline(&self) -> Outline {
+        let points = self.points.len() as u64;
+        let (joins_next, facets) = match &self.kind {
+            RowKind::Isoline { joins_next: true } => (true, 2 * (points - 1)),
+            RowKind::Isoline { joins_next: false } => (false, 0),
+            RowKind::Slab { facets } => (false, facets.len() as u64),
+        };
+        Outline {
+            x: Interval::of(self.points.iter().map(|p| p[0])),
+            joins_next,
+            points,
+            facets,
+        }
     }
 }
 
@@ -158,28 +169,12 @@ pub(crate) fn facets(rows: &[Row]) -> impl Iterator<Item = Facet> {
         })
 }
 
-/// The outlines of a body's rows, which must be complete and in order.
-pub(crate) fn outlines(rows: &[Row]) -> Vec<Outline> {
-    let outline = |(i, row): (usize, &Row)| {
-        let own = Outline {
-            x: row.x(),
-            joins_next: false,
-            points: row.points.len() as u64,
-            facets: 0,
-        };
-        match &row.kind {
-            RowKind::Isoline { joins_next: false } => own,
-            RowKind::Isoline { joins_next: true } => Outline {
-                x: own.x.hull(rows[i + 1].x()),
-                joins_next: true,
-                facets: 2 * (own.points - 1),
-                ..own
-            },
-            RowKind::Slab { facets } => Outline {
-                facets: facets.len() as u64,
-                ..own
-            },
+/// Makes outlines of single rows, which are those of a body in order, reach to the next row where
+/// they join it.
+pub(crate) fn join(outlines: &mut [Outline]) {
+    for i in 1..outlines.len() {
+        if outlines[i - 1].joins_next {
+            outlines[i - 1].x = outlines[i - 1].x.hull(outlines[i].x);
         }
-    };
-    rows.iter().enumerate().map(outline).collect()
+    }
 }

@@ -14,8 +14,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use horma_core::{
-    Axis, Contact, Culling, Cutter, Discretization, Job, Local, Method, Motion, MotionKind, Point,
-    unit,
+    Axis, Contact, Culling, Cutter, Discretization, Distribution, Job, Local, Method, Motion,
+    MotionKind, Point, unit,
 };
 
 pub use self::place::Place;
@@ -51,15 +51,8 @@ pub struct JobFile {
 pub struct Cluster {
     /// Worker processes; 0 computes in this one.
     pub workers: u32,
-    /// How they get the part.
+    /// How workers come by their rows.
     pub distribution: Distribution,
-}
-
-/// How the workers of a cluster get the part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Distribution {
-    /// The master sends each worker its rows and those of its neighbours that its cutter reaches.
-    Overlap,
 }
 
 /// How the path is run on the machine.
@@ -163,7 +156,11 @@ const LOCAL: Local = Local {
     },
     fallback: true,
 };
-const DISTRIBUTIONS: [(&str, Distribution); 1] = [("overlap", Distribution::Overlap)];
+const DISTRIBUTIONS: [(&str, Distribution); 3] = [
+    ("overlap", Distribution::Overlap),
+    ("halo", Distribution::Halo),
+    ("surface", Distribution::Surface),
+];
 
 /// The wheels, each with its keys.
 const CUTTERS: [(&str, &[&str]); 4] = [

@@ -4,28 +4,33 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use horma_core::{Extent, ExtentRecord, Inserted, Plan, SubTrajectory};
+use horma_core::{Extent, ExtentRecord, Handout, Run, Stock, SubTrajectory};
 use horma_proto::transport::{self, Trouble};
 use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::digitize_request::Kind as Request;
+use horma_proto::wire::task::Supply;
 use horma_proto::wire::worker_client::WorkerClient;
 use horma_proto::wire::{self, DigitizeReply, DigitizeRequest};
 use horma_proto::{Answer, Chunks, Error, MAX_MESSAGE, Role, TaskId, Tls};
 use prost::Message;
 use tokio::sync::oneshot;
+use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
 use crate::Progress;
-use crate::state::Fault;
+use crate::received::Received;
+use crate::state::{Fault, Held};
 
 /// All that an attempt needs.
 pub(crate) struct Attempt {
     pub task: TaskId,
     pub worker: String,
     pub address: String,
-    pub plan: Arc<Plan>,
+    pub plan: Arc<Handout>,
     pub extent: Extent,
     pub overlap_rows: u32,
+    /// Who holds the rows, the worker's own first, and where; nobody if they come with the task.
+    pub holders: Vec<(Held, String)>,
     /// Positions of the job that have arrived so far.
     pub arrived: Arc<AtomicU64>,
     /// Those of them that were inserted, which `arrived` does not count.
@@ -36,7 +41,7 @@ pub(crate) struct Attempt {
 
 /// A task, delivered.
 pub(crate) struct Delivery {
-    pub positions: SubTrajectory,
+    pub positions: Vec<SubTrajectory>,
     pub record: ExtentRecord,
 }
 
@@ -51,10 +56,7 @@ pub(crate) async fn dispatch(
     attempt: Attempt,
     cut_off: oneshot::Receiver<String>,
 ) -> Result<Delivery, Undelivered> {
-    let mut received = SubTrajectory {
-        first: attempt.extent.first,
-        ..SubTrajectory::default()
-    };
+    let mut received = Received::new(attempt.extent.first, attempt.extent.count);
     let call = call(&attempt, &mut received);
     let outcome = tokio::select! {
         outcome = call => outcome,
@@ -62,18 +64,18 @@ pub(crate) async fn dispatch(
     };
     match outcome {
         Ok(record) => Ok(Delivery {
-            positions: received,
+            positions: received.into_parts(),
             record,
         }),
         Err(fault) => {
-            let positions_received = received.touches.len() as u64;
+            let positions_received = received.so_far();
             attempt
                 .arrived
                 .fetch_sub(positions_received, Ordering::Relaxed);
             // Beyond what there is memory for the job is over, and the driver has to see it.
             let all = attempt.inserted.load(Ordering::Relaxed);
             if attempt.plan.check_inserted(all).is_ok() {
-                let inserted = received.between.len() as u64;
+                let inserted = received.inserted();
                 attempt.inserted.fetch_sub(inserted, Ordering::Relaxed);
             }
             Err(Undelivered {
@@ -84,22 +86,34 @@ pub(crate) async fn dispatch(
     }
 }
 
-async fn call(attempt: &Attempt, received: &mut SubTrajectory) -> Result<ExtentRecord, Fault> {
-    let begin = Instant::now();
-    let tls = attempt.tls.as_ref();
+/// A connection to a worker.
+pub(crate) async fn connect(
+    address: &str,
+    tls: Option<&Tls>,
+) -> Result<WorkerClient<Channel>, Fault> {
     let lost = |e: tonic::transport::Error| lost(&e);
-    let endpoint = transport::endpoint(&attempt.address).map_err(lost)?;
+    let endpoint = transport::endpoint(address).map_err(lost)?;
     let channel = transport::connect(&endpoint, Role::Worker, tls)
         .await
         .map_err(lost)?;
-    let mut client = WorkerClient::new(channel)
+    Ok(WorkerClient::new(channel)
         .max_decoding_message_size(MAX_MESSAGE)
-        .max_encoding_message_size(MAX_MESSAGE);
+        .max_encoding_message_size(MAX_MESSAGE))
+}
+
+async fn call(attempt: &Attempt, received: &mut Received) -> Result<ExtentRecord, Fault> {
+    let begin = Instant::now();
+    let mut client = connect(&attempt.address, attempt.tls.as_ref()).await?;
     let sent = Arc::new(AtomicU64::new(0));
     let replies = client.digitize(requests(attempt, sent.clone())).await;
     let mut replies = replies.map_err(|s| fault(&s))?.into_inner();
     let (finished, bytes_received) = receive(attempt, received, &mut replies).await?;
     let counters = finished.counters.unwrap_or_default();
+    let halo_rows = attempt.extent.halo.iter().map(|h| h.rows.len() as u32);
+    let with_task = match (&attempt.plan.stock, attempt.holders.is_empty()) {
+        (Stock::Rows(_), true) => attempt.extent.rows.len() as u64,
+        (Stock::Rows(_), false) | (Stock::Grids(_), _) => 0,
+    };
     Ok(ExtentRecord {
         extent: attempt.task.extent,
         attempt: attempt.task.attempt,
@@ -108,34 +122,49 @@ async fn call(attempt: &Attempt, received: &mut SubTrajectory) -> Result<ExtentR
         positions: attempt.extent.count,
         rows: attempt.extent.rows.len() as u32,
         overlap_rows: attempt.overlap_rows,
+        halo_rows: halo_rows.sum(),
+        rows_sent: with_task,
         bytes_sent: sent.load(Ordering::Relaxed),
+        bytes_fetched: finished.halo_bytes,
         bytes_received,
+        // Known to whoever placed them.
+        place_seconds: 0.0,
         seconds: begin.elapsed().as_secs_f64(),
+        receive_seconds: finished.receive_seconds,
+        make_seconds: finished.make_seconds,
+        halo_seconds: finished.halo_seconds,
         build_seconds: finished.build_seconds,
         digitize_seconds: finished.digitize_seconds,
         counters: horma_proto::counters_from_wire(counters),
     })
 }
 
-/// The task and its rows, packed as they are sent.
+/// The task and what its rows come from, packed as they are sent.
 fn requests(
     attempt: &Attempt,
     sent: Arc<AtomicU64>,
 ) -> impl tokio_stream::Stream<Item = DigitizeRequest> + Send + 'static {
+    let (supply, chunks) = supply(attempt);
+    let run = |run: Run| wire::Run {
+        first: run.first,
+        count: run.count,
+        rows: horma_proto::spans_of(&run.rows),
+    };
     let task = wire::Task {
         id: Some(attempt.task.into()),
         job: Some(horma_proto::job_to_wire(&attempt.plan.job)),
         trajectory: Some(horma_proto::trajectory_to_wire(&attempt.plan.trajectory)),
         first: attempt.extent.first,
         count: attempt.extent.count,
-        rows: attempt.extent.rows.len() as u32,
+        runs: attempt
+            .plan
+            .runs(&attempt.extent)
+            .into_iter()
+            .map(run)
+            .collect(),
+        supply: Some(supply),
     };
-    let (plan, rows) = (attempt.plan.clone(), attempt.extent.rows.clone());
-    let rows = rows
-        .into_iter()
-        .map(move |id| horma_proto::row_to_wire(&plan.model.rows[id as usize]));
-    let chunks = Chunks::of(rows).map(Request::Rows);
-    let requests = std::iter::once(Request::Task(task)).chain(chunks);
+    let requests = std::iter::once(Request::Task(task)).chain(chunks.map(Request::Rows));
     tokio_stream::iter(requests.map(move |kind| {
         let request = DigitizeRequest { kind: Some(kind) };
         sent.fetch_add(request.encoded_len() as u64, Ordering::Relaxed);
@@ -143,10 +172,59 @@ fn requests(
     }))
 }
 
-/// Takes the positions in; every one must come once, in order, for this very task.
+type AllChunks = Box<dyn Iterator<Item = wire::Chunk> + Send>;
+
+/// How the worker comes by its rows. This is all in which the distributions differ here.
+fn supply(attempt: &Attempt) -> (Supply, AllChunks) {
+    let (plan, rows) = (attempt.plan.clone(), attempt.extent.rows.clone());
+    match (&attempt.plan.stock, &attempt.holders[..]) {
+        (_, [(own, _), others @ ..]) => {
+            let source = |(held, address): &(Held, String)| wire::Source {
+                id: Some(held.id.into()),
+                worker: held.worker.clone(),
+                address: address.clone(),
+                rows: halo_of(&attempt.extent, held.id.extent),
+            };
+            let holdings = wire::Holdings {
+                own: Some(own.id.into()),
+                halo: others.iter().map(source).collect(),
+            };
+            (Supply::Holdings(holdings), Box::new(std::iter::empty()))
+        }
+        (Stock::Rows(_), []) => {
+            let supply = Supply::Rows(rows.len() as u32);
+            (supply, Box::new(Chunks::of(rows_to_wire(plan, rows))))
+        }
+        (Stock::Grids(grids), []) => {
+            let grids = grids.iter().filter_map(|grid| grid.only(&rows));
+            let grids: Vec<_> = grids.map(|g| horma_proto::grid_to_wire(&g)).collect();
+            let supply = Supply::Grids(grids.len() as u32);
+            (supply, Box::new(Chunks::of(grids.into_iter())))
+        }
+    }
+}
+
+/// The rows that an extent needs of another.
+fn halo_of(extent: &Extent, other: u32) -> Vec<wire::Span> {
+    let halo = extent.halo.iter().find(|h| h.extent == other);
+    halo.map_or(Vec::new(), |h| horma_proto::spans_of(&h.rows))
+}
+
+/// Rows by their ids, packed as they are taken.
+pub(crate) fn rows_to_wire(
+    plan: Arc<Handout>,
+    ids: Vec<u32>,
+) -> impl Iterator<Item = wire::Row> + Send + 'static {
+    ids.into_iter().filter_map(move |id| match &plan.stock {
+        Stock::Rows(rows) => Some(horma_proto::row_to_wire(&rows[id as usize])),
+        Stock::Grids(_) => None,
+    })
+}
+
+/// Takes the positions in; every one must come once, for this very task.
 async fn receive(
     attempt: &Attempt,
-    received: &mut SubTrajectory,
+    received: &mut Received,
     replies: &mut Streaming<DigitizeReply>,
 ) -> Result<(wire::Finished, u64), Fault> {
     let wrong = |error: Error| Fault::Wrong(error.to_string());
@@ -158,26 +236,34 @@ async fn receive(
         if id != attempt.task {
             return Err(Fault::Wrong(format!("it speaks of {id}")));
         }
-        let next = received.first + received.touches.len() as u64;
-        let left = attempt.extent.first + attempt.extent.count - next;
+        let left = received.left();
         match reply.kind {
             Some(Reply::Positions(positions)) => {
                 let run = horma_proto::unpack_positions(&positions, total).map_err(wrong)?;
                 let count = run.touches.len() as u64;
-                if run.first != next || count > left {
-                    return Err(Fault::Wrong(format!(
-                        "it sent positions {} to {} where position {next} was next and {left} were left",
-                        run.first,
-                        run.end(),
-                    )));
+                let inserted = run.between.len() as u64;
+                if inserted > 0 && attempt.plan.job.motion.path_tolerance.is_none() {
+                    let why = "it inserted positions that nobody asked for";
+                    return Err(Fault::Wrong(why.to_owned()));
                 }
-                receive_inserted(attempt, received, run.between)?;
-                received.touches.extend(run.touches);
+                received.take(run).map_err(Fault::Wrong)?;
+                let all = attempt.inserted.fetch_add(inserted, Ordering::Relaxed) + inserted;
+                let fits = attempt.plan.check_inserted(all);
+                fits.map_err(|e| Fault::Lost(e.to_string()))?;
                 let arrived = attempt.arrived.fetch_add(count, Ordering::Relaxed) + count;
                 (attempt.progress)("digitize", arrived, total);
             }
             Some(Reply::Finished(finished)) if left == 0 => {
-                let seconds = finished.build_seconds + finished.digitize_seconds;
+                let wire::Finished {
+                    build_seconds,
+                    digitize_seconds,
+                    receive_seconds,
+                    make_seconds,
+                    halo_seconds,
+                    ..
+                } = finished;
+                let seconds = build_seconds + digitize_seconds + receive_seconds;
+                let seconds = seconds + make_seconds + halo_seconds;
                 if !seconds.is_finite() {
                     return Err(Fault::Wrong(format!("it worked for {seconds} s")));
                 }
@@ -188,32 +274,24 @@ async fn receive(
                     "it finished with {left} positions left"
                 )));
             }
+            Some(Reply::HaloLost(lost)) => {
+                let source: TaskId = lost.source.try_into().map_err(wrong)?;
+                let mut others = attempt.holders.iter().skip(1);
+                if !others.any(|(held, _)| held.id == source) {
+                    return Err(Fault::Wrong(format!("it asked for the rows of {source}")));
+                }
+                let reason = lost.reason;
+                return Err(Fault::Halo { source, reason });
+            }
             None => return Err(Fault::Wrong("it sent an empty reply".to_owned())),
         }
     }
     Err(Fault::Lost("it ended its answer early".to_owned()))
 }
 
-/// Takes in what was inserted, if that was asked for and there is memory for it.
-fn receive_inserted(
-    attempt: &Attempt,
-    received: &mut SubTrajectory,
-    between: Vec<Inserted>,
-) -> Result<(), Fault> {
-    if attempt.plan.job.motion.path_tolerance.is_none() && !between.is_empty() {
-        let why = "it inserted positions that nobody asked for";
-        return Err(Fault::Wrong(why.to_owned()));
-    }
-    let count = between.len() as u64;
-    let all = attempt.inserted.fetch_add(count, Ordering::Relaxed) + count;
-    received.between.extend(between);
-    let fits = attempt.plan.check_inserted(all);
-    fits.map_err(|e| Fault::Lost(e.to_string()))
-}
-
 /// What a status says of the worker. Only an answer about the content is the worker's fault; a
 /// partition may show as almost anything else.
-fn fault(status: &Status) -> Fault {
+pub(crate) fn fault(status: &Status) -> Fault {
     match Answer::of(status) {
         Answer::Wrong => Fault::Wrong(status.message().to_owned()),
         Answer::Silence => lost(status),

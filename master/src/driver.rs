@@ -5,21 +5,20 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
+use std::sync::atomic::Ordering;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-use horma_core::{
-    Counters, Extent, ExtentRecord, Job, LostAttempt, Part, Phase, Plan, Record, SubTrajectory,
-    WorkerRecord, stitch,
-};
+use horma_core::{Distribution, Handout, Job, Part, Phase, Record, SubTrajectory, stitch};
 use horma_proto::TaskId;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
-use crate::dispatch::{Attempt, Delivery, Undelivered, dispatch};
+use crate::dispatch::{Delivery, Undelivered, dispatch};
 use crate::error::{Error, Result};
-use crate::state::{Command, Event, State, apply};
+use crate::place::{Placed, place};
+use crate::running::RunningJob;
+use crate::state::{Command, Event, Fault, Held, State, Step, apply};
 use crate::{Config, Outcome, Progress};
 
 /// Messages that may wait for the driver.
@@ -31,6 +30,14 @@ pub struct Master {
     inbox: mpsc::Sender<Message>,
     workers: watch::Receiver<usize>,
     config: Config,
+    /// New each time a master starts: it counts its jobs anew.
+    pub(crate) incarnation: u64,
+}
+
+/// The jobs that are going on, and the number of the next one.
+pub(crate) struct Going {
+    pub jobs: Vec<u64>,
+    pub next_job: u64,
 }
 
 /// What the driver is told.
@@ -45,11 +52,11 @@ pub(crate) enum Message {
     Heartbeat {
         worker: String,
         incarnation: u64,
-        /// Whether it is known.
-        reply: oneshot::Sender<bool>,
+        /// What is going on, if it is known.
+        reply: oneshot::Sender<Option<Going>>,
     },
     Run {
-        plan: Arc<Plan>,
+        plan: Arc<Handout>,
         parts: u32,
         progress: Progress,
         reply: oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>,
@@ -59,12 +66,19 @@ pub(crate) enum Message {
         task: TaskId,
         outcome: std::result::Result<Delivery, Undelivered>,
     },
+    /// Rows are placed, or not.
+    Placed {
+        worker: String,
+        task: TaskId,
+        outcome: std::result::Result<Placed, Fault>,
+    },
 }
 
 impl Master {
     pub(crate) fn start(config: Config, shutdown: CancellationToken) -> Self {
         let (inbox, messages) = mpsc::channel(INBOX);
         let (count, workers) = watch::channel(0);
+        let incarnation = incarnation();
         let driver = Driver {
             config: config.clone(),
             begin: Instant::now(),
@@ -72,6 +86,7 @@ impl Master {
             addresses: BTreeMap::new(),
             jobs: BTreeMap::new(),
             next_job: 1,
+            incarnation,
             inbox: inbox.downgrade(),
             count,
         };
@@ -80,6 +95,7 @@ impl Master {
             inbox,
             workers,
             config,
+            incarnation,
         }
     }
 
@@ -99,12 +115,13 @@ impl Master {
         &self,
         part: Part,
         job: Job,
+        distribution: Distribution,
         at_least: usize,
         progress: Progress,
     ) -> Result<Outcome> {
         let begin = Instant::now();
         progress("discretize", 0, 0);
-        let plan = Arc::new(crate::plan(part, job, self.config.memory).await?);
+        let plan = Arc::new(crate::plan(part, job, distribution, &self.config).await?);
         let discretized = begin.elapsed();
         let parts = self.gather(at_least.max(1)).await?;
 
@@ -134,7 +151,7 @@ impl Master {
             seconds: time.as_secs_f64(),
         })
         .into();
-        record.bodies.clone_from(&plan.model.bodies);
+        record.bodies.clone_from(&plan.bodies);
         Ok((path, record))
     }
 
@@ -161,6 +178,12 @@ impl Master {
     }
 }
 
+/// A number that no earlier start of a master had.
+fn incarnation() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |t| t.as_nanos() as u64)
+}
+
 struct Driver {
     config: Config,
     begin: Instant,
@@ -168,27 +191,9 @@ struct Driver {
     addresses: BTreeMap<String, String>,
     jobs: BTreeMap<u64, RunningJob>,
     next_job: u64,
+    incarnation: u64,
     inbox: mpsc::WeakSender<Message>,
     count: watch::Sender<usize>,
-}
-
-struct RunningJob {
-    plan: Arc<Plan>,
-    extents: Vec<Extent>,
-    /// How many extents need each row.
-    users: Vec<u32>,
-    progress: Progress,
-    /// Positions that have arrived.
-    arrived: Arc<AtomicU64>,
-    /// Inserted positions that have arrived.
-    inserted: Arc<AtomicU64>,
-    /// What was delivered and kept, by extent.
-    kept: BTreeMap<u32, (SubTrajectory, ExtentRecord)>,
-    lost: Vec<LostAttempt>,
-    /// Calls under way: each ends when it is told why, or when the job is dropped.
-    calls: BTreeMap<TaskId, oneshot::Sender<String>>,
-    workers: BTreeMap<String, String>,
-    reply: oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>,
 }
 
 impl Driver {
@@ -259,7 +264,11 @@ impl Driver {
                 if known {
                     self.apply(Event::Heartbeat { worker }, None);
                 }
-                let _ = reply.send(known);
+                let going = known.then(|| Going {
+                    jobs: self.state.jobs().collect(),
+                    next_job: self.next_job,
+                });
+                let _ = reply.send(going);
             }
             Message::Run {
                 plan,
@@ -269,37 +278,17 @@ impl Driver {
             } => {
                 let job = self.next_job;
                 self.next_job += 1;
-                let extents = plan.split(parts);
-                info!(
-                    job,
-                    extents = extents.len(),
-                    positions = plan.trajectory.positions,
-                    "job"
-                );
-                progress("digitize", 0, plan.trajectory.positions);
-                let count = extents.len() as u32;
-                let mut users = vec![0; plan.model.rows.len()];
-                for &row in extents.iter().flat_map(|e| &e.rows) {
-                    users[row as usize] += 1;
-                }
-                let running = RunningJob {
-                    plan,
-                    extents,
-                    users,
-                    progress,
-                    arrived: Arc::default(),
-                    inserted: Arc::default(),
-                    kept: BTreeMap::new(),
-                    lost: Vec::new(),
-                    calls: BTreeMap::new(),
-                    workers: BTreeMap::new(),
-                    reply,
-                };
+                let running = RunningJob::new(plan, parts, progress, reply);
+                let (extents, halos) = (running.extents.len() as u32, running.halos());
+                let positions = running.plan.trajectory.positions;
+                info!(job, extents, positions, "job");
+                (running.progress)("digitize", 0, positions);
                 self.jobs.insert(job, running);
                 self.apply(
                     Event::Submitted {
                         job,
-                        extents: count,
+                        extents,
+                        halos,
                     },
                     None,
                 );
@@ -309,6 +298,43 @@ impl Driver {
                 task,
                 outcome,
             } => self.over(worker, task, outcome),
+            Message::Placed {
+                worker,
+                task,
+                outcome,
+            } => self.placed(worker, task, outcome),
+        }
+    }
+
+    /// Rows are placed, or not.
+    fn placed(
+        &mut self,
+        worker: String,
+        task: TaskId,
+        outcome: std::result::Result<Placed, Fault>,
+    ) {
+        let Some(job) = self.jobs.get_mut(&task.job) else {
+            return;
+        };
+        job.calls.remove(&task);
+        match outcome {
+            Ok(placed) => {
+                info!(%task, worker, rows = placed.rows, "placed");
+                *job.placed.entry(task.extent).or_default() += placed;
+                self.apply(Event::Placed { worker, task }, None);
+            }
+            Err(fault) => {
+                warn!(%task, worker, ?fault, "not placed");
+                job.lose(&worker, task, &fault, 0);
+                let step = Step::Place;
+                let failed = Event::Failed {
+                    worker,
+                    task,
+                    step,
+                    fault,
+                };
+                self.apply(failed, None);
+            }
         }
     }
 
@@ -342,22 +368,15 @@ impl Driver {
                 positions_received,
             }) => {
                 warn!(%task, worker, ?fault, positions_received, "not delivered");
-                job.lost.push(LostAttempt {
-                    extent: task.extent,
-                    attempt: task.attempt,
-                    worker: worker.clone(),
-                    positions_received,
-                    positions: job.extents[task.extent as usize].count,
-                    reason: fault.to_string(),
-                });
-                self.apply(
-                    Event::Failed {
-                        worker,
-                        task,
-                        fault,
-                    },
-                    None,
-                );
+                job.lose(&worker, task, &fault, positions_received);
+                let step = Step::Digitize;
+                let failed = Event::Failed {
+                    worker,
+                    task,
+                    step,
+                    fault,
+                };
+                self.apply(failed, None);
             }
         }
     }
@@ -365,7 +384,8 @@ impl Driver {
     fn apply(&mut self, event: Event, mut delivery: Option<Delivery>) {
         for command in apply(&mut self.state, self.begin.elapsed(), event) {
             match command {
-                Command::Start { worker, task } => self.start(worker, task),
+                Command::Place { worker, task } => self.place(worker, task),
+                Command::Start { worker, task, rows } => self.start(worker, task, rows),
                 Command::Abort { task, reason } => {
                     info!(%task, reason, "aborted");
                     let job = self.jobs.get_mut(&task.job);
@@ -397,8 +417,8 @@ impl Driver {
         }
     }
 
-    /// Brings a task to a worker, in the background.
-    fn start(&mut self, worker: String, task: TaskId) {
+    /// Brings an extent's own rows to a worker, in the background.
+    fn place(&mut self, worker: String, task: TaskId) {
         let (Some(job), Some(address)) =
             (self.jobs.get_mut(&task.job), self.addresses.get(&worker))
         else {
@@ -407,20 +427,40 @@ impl Driver {
         let (call, cut_off) = oneshot::channel();
         job.calls.insert(task, call);
         job.workers.insert(worker.clone(), address.clone());
-        let extent = job.extents[task.extent as usize].clone();
-        let shared = |row: &&u32| job.users[**row as usize] > 1;
-        let attempt = Attempt {
-            task,
-            worker: worker.clone(),
-            address: address.clone(),
-            plan: job.plan.clone(),
-            overlap_rows: extent.rows.iter().filter(shared).count() as u32,
-            extent,
-            arrived: job.arrived.clone(),
-            inserted: job.inserted.clone(),
-            progress: job.progress.clone(),
-            tls: self.config.tls.clone(),
+        let placing = job.placing(task, address, self.incarnation, self.config.tls.clone());
+        info!(%task, worker, rows = placing.rows.len(), "placing");
+        let inbox = self.inbox.clone();
+        tokio::spawn(async move {
+            let outcome = place(placing, cut_off).await;
+            if let Some(inbox) = inbox.upgrade() {
+                let placed = Message::Placed {
+                    worker,
+                    task,
+                    outcome,
+                };
+                // The driver may have stopped: then nobody waits for this.
+                let _ = inbox.send(placed).await;
+            }
+        });
+    }
+
+    /// Brings a task to a worker, in the background.
+    fn start(&mut self, worker: String, task: TaskId, rows: Vec<Held>) {
+        let (Some(job), Some(address)) =
+            (self.jobs.get_mut(&task.job), self.addresses.get(&worker))
+        else {
+            return;
         };
+        let (call, cut_off) = oneshot::channel();
+        job.calls.insert(task, call);
+        job.workers.insert(worker.clone(), address.clone());
+        let located = |held: Held| {
+            let address = self.addresses.get(&held.worker).cloned();
+            (held, address.unwrap_or_default())
+        };
+        let holders = rows.into_iter().map(located).collect();
+        let tls = self.config.tls.clone();
+        let attempt = job.attempt(task, &worker, address, holders, tls);
         info!(%task, worker, positions = attempt.extent.count, "started");
         let inbox = self.inbox.clone();
         tokio::spawn(async move {
@@ -435,27 +475,5 @@ impl Driver {
                 let _ = inbox.send(over).await;
             }
         });
-    }
-}
-
-impl RunningJob {
-    /// Hands over what was kept.
-    fn complete(self) {
-        let mut counters = Counters::default();
-        let (mut parts, mut extents) = (Vec::new(), Vec::new());
-        for (positions, record) in self.kept.into_values() {
-            counters += record.counters;
-            parts.push(positions);
-            extents.push(record);
-        }
-        let worker = |(worker, address)| WorkerRecord { worker, address };
-        let record = Record {
-            counters,
-            workers: self.workers.into_iter().map(worker).collect(),
-            extents,
-            lost: self.lost,
-            ..Record::default()
-        };
-        let _ = self.reply.send(Ok((parts, record)));
     }
 }

@@ -1,22 +1,26 @@
 //! The master: it splits a job into extents, schedules them on workers, and stitches the path.
 //!
 //! `state` decides and touches nothing; `driver` owns it, feeds it events and carries out its
-//! commands; `dispatch` brings one task to one worker and its positions back; `service` is what
-//! workers and clients see. The master digitizes nothing itself and reads no file.
+//! commands; `place` brings rows to the worker that holds them, `dispatch` one task to one worker and
+//! its positions back; `service` is what workers and clients see. The master digitizes nothing itself and
+//! reads no file.
 
 mod error;
 
 mod service;
 
 mod driver;
+mod running;
 mod state;
 
 mod dispatch;
+mod place;
+mod received;
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use horma_core::{Job, Part, Plan, Record, ToolPath};
+use horma_core::{Distribution, Handout, Job, Part, Record, ToolPath};
 use horma_proto::wire::master_server::MasterServer;
 use horma_proto::{Guard, MAX_MESSAGE, Tls, transport};
 use tokio::net::TcpListener;
@@ -43,6 +47,8 @@ pub struct Config {
     pub max_part: u64,
     /// Memory that one job may take, bytes.
     pub memory: u64,
+    /// Whether workers share that memory.
+    pub workers_here: bool,
 }
 
 /// A path and how it came about.
@@ -90,8 +96,15 @@ pub fn start(
 }
 
 /// Plans a job on a thread of its own: discretizing a part is work.
-pub(crate) async fn plan(part: Part, job: Job, memory: u64) -> Result<Plan> {
-    let planned = tokio::task::spawn_blocking(move || Plan::new(&part, job, memory)).await;
+pub(crate) async fn plan(
+    part: Part,
+    job: Job,
+    distribution: Distribution,
+    config: &Config,
+) -> Result<Handout> {
+    let (memory, here) = (config.memory, config.workers_here);
+    let plan = move || Handout::new(&part, job, distribution, memory, here);
+    let planned = tokio::task::spawn_blocking(plan).await;
     planned
         .map_err(|_| Error::Interrupted)?
         .map_err(Error::Plan)

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use horma_core::{Job, Part};
+use horma_core::{Distribution, Job, Part};
 use horma_proto::wire::master_server::Master as Api;
 use horma_proto::wire::submit_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
@@ -17,7 +17,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request as Call, Response, Status, Streaming};
 use tracing::info;
 
-use crate::driver::{Master, Message};
+use crate::driver::{Going, Master, Message};
 use crate::{Outcome, Progress};
 
 /// Replies that may wait for a client.
@@ -37,10 +37,10 @@ pub(crate) struct Service {
 }
 
 impl Service {
-    async fn ask(
+    async fn ask<T>(
         &self,
-        message: impl FnOnce(oneshot::Sender<bool>) -> Message,
-    ) -> Result<bool, Status> {
+        message: impl FnOnce(oneshot::Sender<T>) -> Message,
+    ) -> Result<T, Status> {
         let (reply, answer) = oneshot::channel();
         let stopping = Error::ShuttingDown("the master");
         if self.master.tell(message(reply)).await.is_err() {
@@ -78,6 +78,7 @@ impl Api for Service {
         }
         Ok(Response::new(RegisterReply {
             heartbeat_ms: self.heartbeat.as_millis() as u32,
+            master: self.master.incarnation,
         }))
     }
 
@@ -96,10 +97,9 @@ impl Api for Service {
             incarnation,
             reply,
         };
-        if self.ask(heartbeat).await? {
-            Ok(Response::new(HeartbeatReply {}))
-        } else {
-            Err(Error::UnknownWorker { worker: name }.into())
+        match self.ask(heartbeat).await? {
+            Some(Going { jobs, next_job }) => Ok(Response::new(HeartbeatReply { jobs, next_job })),
+            None => Err(Error::UnknownWorker { worker: name }.into()),
         }
     }
 
@@ -108,7 +108,8 @@ impl Api for Service {
         call: Call<Streaming<SubmitRequest>>,
     ) -> Result<Response<Self::SubmitStream>, Status> {
         self.guard.admit(&call, Role::Client)?;
-        let (part, job) = receive(call.into_inner(), self.max_part).await?;
+        let submitted = receive(call.into_inner(), self.max_part).await?;
+        let (part, job, distribution) = submitted;
         info!(bodies = part.bodies.len(), "submitted");
         let (replies, stream) = mpsc::channel(WAITING_REPLIES);
         let master = self.master.clone();
@@ -120,7 +121,7 @@ impl Api for Service {
                 let progress = Reply::Progress(wire::Progress { phase, done, total });
                 let _ = telling.try_send(Ok(reply(progress)));
             });
-            let run = master.run(part, job, 1, progress);
+            let run = master.run(part, job, distribution, 1, progress);
             let outcome = tokio::select! {
                 outcome = run => outcome,
                 // The client hung up: dropping the run cancels it.
@@ -149,7 +150,7 @@ fn check_version(theirs: String) -> Result<(), Error> {
 async fn receive(
     mut requests: Streaming<SubmitRequest>,
     max_part: u64,
-) -> Result<(Part, Job), Status> {
+) -> Result<(Part, Job, Distribution), Status> {
     let mut job = None;
     let mut part = Part::default();
     let mut messages = Messages::default();
@@ -163,12 +164,14 @@ async fn receive(
         match (next?.map(|r| r.kind), &job) {
             (None, _) => break,
             (Some(Some(Request::Header(header))), None) => {
+                let distribution = header.distribution();
                 check_version(header.version)?;
+                let distribution = horma_proto::distribution_from_wire(distribution)?;
                 let header = header.job.ok_or(Error::Missing {
                     message: "submission",
                     field: "a job",
                 })?;
-                job = Some(horma_proto::job_from_wire(&header)?);
+                job = Some((horma_proto::job_from_wire(&header)?, distribution));
             }
             (Some(Some(Request::Bodies(chunk))), Some(_)) => {
                 bytes += chunk.data.len() as u64;
@@ -197,8 +200,8 @@ async fn receive(
     if !messages.is_empty() {
         return Err(missing("the end of its last body").into());
     }
-    let job = job.ok_or(missing("a header"))?;
-    Ok((part, job))
+    let (job, distribution) = job.ok_or(missing("a header"))?;
+    Ok((part, job, distribution))
 }
 
 /// Sends a path and its record; stops if the client hangs up.

@@ -3,15 +3,24 @@
 //! `apply` is a plain function from state and event to commands. It knows no network, no clock and
 //! no data: time comes with the call, and positions stay with the driver. What must always hold is
 //! checked by the tests below over any order of events.
+//!
+//! Rows either travel with the task, or they are placed first: each extent's own rows go to one
+//! worker, its holder, which serves them to others and digitizes the extent once all that it needs are
+//! placed. Placing comes before digitizing, so nobody waits for rows that nobody is going to have.
+
+mod assign;
+mod lose;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use horma_proto::TaskId;
 
+use self::assign::assign;
+use self::lose::{gone, lose};
 use crate::error::Error;
 
-/// Attempts at one extent after which it is the extent, not the workers, if all of them had a try.
+/// Failures of one extent after which it is the extent, not the workers, if all of them had a try.
 const MAX_ATTEMPTS: u32 = 8;
 
 /// What the master knows.
@@ -32,16 +41,60 @@ pub(crate) struct State {
 struct Worker {
     incarnation: u64,
     seen: Duration,
-    task: Option<TaskId>,
+    task: Option<(TaskId, Step)>,
+}
+
+/// What a worker is busy with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// It takes in an extent's rows.
+    Place,
+    /// It digitizes an extent.
+    Digitize,
 }
 
 #[derive(Debug, Clone, Default)]
 struct Extent {
     status: Status,
-    /// How often it has been tried.
+    /// The number of the last attempt. Placing rows and the first try over them share one.
     attempts: u32,
+    /// Whether the last attempt has only placed rows so far.
+    only_placed: bool,
+    /// How often it failed.
+    failures: u32,
     /// Who tried it in vain: others come first.
     failed_by: BTreeSet<String>,
+    /// Where its own rows are.
+    rows: Rows,
+    /// The other extents whose rows it needs.
+    halo: Vec<u32>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+enum Rows {
+    /// They travel with every task.
+    #[default]
+    WithTask,
+    Nowhere,
+    OnTheWay,
+    Held(Held),
+}
+
+/// Rows that a worker holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Held {
+    /// By which attempt it got them.
+    pub id: TaskId,
+    pub worker: String,
+}
+
+impl Extent {
+    fn held(&self) -> Option<&Held> {
+        match &self.rows {
+            Rows::Held(held) => Some(held),
+            Rows::WithTask | Rows::Nowhere | Rows::OnTheWay => None,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -61,16 +114,24 @@ pub(crate) enum Event {
     Heartbeat { worker: String },
     /// Time went by.
     Tick,
-    /// A job was split into so many extents.
-    Submitted { job: u64, extents: u32 },
+    /// A job was split into so many extents. If their rows are to be placed, each has a list of those
+    /// others whose rows it needs.
+    Submitted {
+        job: u64,
+        extents: u32,
+        halos: Option<Vec<Vec<u32>>>,
+    },
     /// Nobody wants the job any more.
     Cancelled { job: u64 },
+    /// A worker holds an extent's rows.
+    Placed { worker: String, task: TaskId },
     /// A worker delivered all of a task.
     Delivered { worker: String, task: TaskId },
-    /// A worker did not deliver a task.
+    /// A worker did not deliver a task, or did not take its rows.
     Failed {
         worker: String,
         task: TaskId,
+        step: Step,
         fault: Fault,
     },
 }
@@ -82,6 +143,9 @@ pub(crate) enum Fault {
     Lost(String),
     /// The worker's answer cannot be right.
     Wrong(String),
+    /// The worker could not get rows from the one that holds them: the fault of that one, or of the
+    /// way there.
+    Halo { source: TaskId, reason: String },
 }
 
 impl std::fmt::Display for Fault {
@@ -89,6 +153,7 @@ impl std::fmt::Display for Fault {
         match self {
             Self::Lost(reason) => write!(f, "lost: {reason}"),
             Self::Wrong(reason) => write!(f, "wrong: {reason}"),
+            Self::Halo { source, reason } => write!(f, "halo of {source} lost: {reason}"),
         }
     }
 }
@@ -96,8 +161,15 @@ impl std::fmt::Display for Fault {
 /// What the driver is to do.
 #[derive(Debug, Clone)]
 pub(crate) enum Command {
-    /// Bring this task to this worker.
-    Start { worker: String, task: TaskId },
+    /// Bring an extent's own rows to this worker.
+    Place { worker: String, task: TaskId },
+    /// Bring this task to this worker. Unless rows travel with it, the worker holds the first of
+    /// these, and gets the others from those who do.
+    Start {
+        worker: String,
+        task: TaskId,
+        rows: Vec<Held>,
+    },
     /// Nobody waits for this task any more.
     Abort { task: TaskId, reason: String },
     /// The delivered positions are the extent's: keep them.
@@ -133,6 +205,11 @@ impl State {
     pub fn workers(&self) -> usize {
         self.workers.len()
     }
+
+    /// The jobs that are going on.
+    pub fn jobs(&self) -> impl Iterator<Item = u64> {
+        self.jobs.keys().copied()
+    }
 }
 
 /// Takes an event in; says what to do. `now` never runs backwards.
@@ -151,10 +228,16 @@ pub(crate) fn apply(state: &mut State, now: Duration, event: Event) -> Vec<Comma
             }
         }
         Event::Tick => expire(state, now, &mut commands),
-        Event::Submitted { job, extents } => {
-            state
-                .jobs
-                .insert(job, vec![Extent::default(); extents as usize]);
+        Event::Submitted {
+            job,
+            extents,
+            halos,
+        } => {
+            let extents = match halos {
+                None => vec![Extent::default(); extents as usize],
+                Some(halos) => halos.into_iter().map(Extent::to_be_placed).collect(),
+            };
+            state.jobs.insert(job, extents);
             complete(state, job, &mut commands);
         }
         Event::Cancelled { job } => {
@@ -162,8 +245,15 @@ pub(crate) fn apply(state: &mut State, now: Duration, event: Event) -> Vec<Comma
                 release(state, job, "the job was cancelled", &mut commands);
             }
         }
+        Event::Placed { worker, task } => {
+            if free(state, &worker, task, Step::Place)
+                && let Some(extent) = extent(state, task)
+            {
+                extent.rows = Rows::Held(Held { id: task, worker });
+            }
+        }
         Event::Delivered { worker, task } => {
-            if free(state, &worker, task) {
+            if free(state, &worker, task, Step::Digitize) {
                 set(state, task, Status::Done);
                 commands.push(Command::Keep { task });
                 complete(state, task.job, &mut commands);
@@ -172,10 +262,11 @@ pub(crate) fn apply(state: &mut State, now: Duration, event: Event) -> Vec<Comma
         Event::Failed {
             worker,
             task,
+            step,
             fault,
         } => {
-            if free(state, &worker, task) {
-                lose(state, &worker, task, fault, &mut commands);
+            if free(state, &worker, task, step) {
+                lose(state, &worker, (task, step), fault, &mut commands);
             }
         }
     }
@@ -206,13 +297,9 @@ fn register(
         seen: now,
         task: None,
     };
-    if let Some(Worker {
-        task: Some(task), ..
-    }) = state.workers.insert(name.to_owned(), worker)
-    {
+    if let Some(before) = state.workers.insert(name.to_owned(), worker) {
         let reason = format!("worker {name} started anew");
-        retry(state, name, task, reason.clone(), commands);
-        commands.push(Command::Abort { task, reason });
+        gone(state, name, &before, reason, commands);
     }
 }
 
@@ -232,20 +319,16 @@ fn expire(state: &mut State, now: Duration, commands: &mut Vec<Command>) {
             lease.as_secs()
         );
         state.last_loss = Some(reason.clone());
-        if let Some(Worker {
-            task: Some(task), ..
-        }) = state.workers.remove(&name)
-        {
-            retry(state, &name, task, reason.clone(), commands);
-            commands.push(Command::Abort { task, reason });
+        if let Some(worker) = state.workers.remove(&name) {
+            gone(state, &name, &worker, reason, commands);
         }
     }
 }
 
 /// Takes the task off the worker, if it is the worker's current one: all else is stale.
-fn free(state: &mut State, worker: &str, task: TaskId) -> bool {
+fn free(state: &mut State, worker: &str, task: TaskId, step: Step) -> bool {
     match state.workers.get_mut(worker) {
-        Some(worker) if worker.task == Some(task) => {
+        Some(worker) if worker.task == Some((task, step)) => {
             worker.task = None;
             true
         }
@@ -253,45 +336,14 @@ fn free(state: &mut State, worker: &str, task: TaskId) -> bool {
     }
 }
 
-/// A worker failed a task: it leaves, and the extent waits for another. One that is merely cut off
-/// comes back by registering again.
-fn lose(state: &mut State, name: &str, task: TaskId, fault: Fault, commands: &mut Vec<Command>) {
-    let Some(worker) = state.workers.remove(name) else {
-        return;
-    };
-    let reason = match fault {
-        Fault::Lost(reason) => format!("worker {name} was lost ({reason})"),
-        Fault::Wrong(reason) => {
-            state.distrusted.insert(name.to_owned(), worker.incarnation);
-            format!("worker {name} answered wrongly ({reason})")
-        }
-    };
-    state.last_loss = Some(reason.clone());
-    retry(state, name, task, reason, commands);
-}
-
-/// Puts an extent back, unless everybody has tried it, and that too often.
-fn retry(state: &mut State, worker: &str, task: TaskId, last: String, commands: &mut Vec<Command>) {
-    set(state, task, Status::Waiting);
-    let Some(extents) = state.jobs.get_mut(&task.job) else {
-        return;
-    };
-    let failed_by = &mut extents[task.extent as usize].failed_by;
-    failed_by.insert(worker.to_owned());
-    let someone_else = state.workers.keys().any(|w| !failed_by.contains(w));
-    if task.attempt >= MAX_ATTEMPTS && !someone_else {
-        let error = Error::TooManyAttempts {
-            extent: task.extent,
-            attempts: task.attempt,
-            last,
-        };
-        fail(state, task.job, error, commands);
-    }
+fn extent(state: &mut State, task: TaskId) -> Option<&mut Extent> {
+    let extents = state.jobs.get_mut(&task.job)?;
+    extents.get_mut(task.extent as usize)
 }
 
 fn set(state: &mut State, task: TaskId, to: Status) {
-    if let Some(extents) = state.jobs.get_mut(&task.job) {
-        extents[task.extent as usize].status = to;
+    if let Some(extent) = extent(state, task) {
+        extent.status = to;
     }
 }
 
@@ -305,7 +357,7 @@ fn fail(state: &mut State, job: u64, error: Error, commands: &mut Vec<Command>) 
 /// Takes every task of a job that is over off its worker.
 fn release(state: &mut State, job: u64, reason: &str, commands: &mut Vec<Command>) {
     for worker in state.workers.values_mut() {
-        if let Some(task) = worker.task.take_if(|t| t.job == job) {
+        if let Some((task, _)) = worker.task.take_if(|(t, _)| t.job == job) {
             let reason = reason.to_owned();
             commands.push(Command::Abort { task, reason });
         }
@@ -316,6 +368,8 @@ fn complete(state: &mut State, job: u64, commands: &mut Vec<Command>) {
     let done = |extents: &Vec<Extent>| extents.iter().all(|e| e.status == Status::Done);
     if state.jobs.get(&job).is_some_and(done) {
         state.jobs.remove(&job);
+        // Someone may be about to hold rows that nobody asks for any more.
+        release(state, job, "the job is done", commands);
         commands.push(Command::Complete { job });
     }
 }
@@ -339,45 +393,6 @@ fn desert(state: &mut State, now: Duration, commands: &mut Vec<Command>) {
     };
     for job in state.jobs.keys().copied().collect::<Vec<_>>() {
         fail(state, job, error.clone(), commands);
-    }
-}
-
-/// Gives the extents that wait to idle workers: oldest job first, lowest extent first, and to one that
-/// has failed an extent only if every member has.
-fn assign(state: &mut State, commands: &mut Vec<Command>) {
-    let members: Vec<String> = state.workers.keys().cloned().collect();
-    let mut idle: BTreeSet<&String> = members
-        .iter()
-        .filter(|name| state.workers[*name].task.is_none())
-        .collect();
-    for (&job, extents) in &mut state.jobs {
-        for (number, extent) in (0u32..).zip(extents) {
-            if idle.is_empty() {
-                return;
-            }
-            if extent.status != Status::Waiting {
-                continue;
-            }
-            let tried = |name: &String| extent.failed_by.contains(name);
-            let untried = idle.iter().copied().find(|name| !tried(name));
-            let anyone = || idle.first().copied().filter(|_| members.iter().all(tried));
-            let Some(name) = untried.or_else(anyone) else {
-                continue;
-            };
-            idle.remove(name);
-            extent.attempts += 1;
-            extent.status = Status::Running;
-            let task = TaskId {
-                job,
-                extent: number,
-                attempt: extent.attempts,
-            };
-            if let Some(worker) = state.workers.get_mut(name) {
-                worker.task = Some(task);
-            }
-            let worker = name.clone();
-            commands.push(Command::Start { worker, task });
-        }
     }
 }
 

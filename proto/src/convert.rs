@@ -3,8 +3,9 @@
 
 use bytes::Bytes;
 use horma_core::{
-    Body, Contact, Counters, Culling, Cutter, Direction, Discretization, Job, Local, Mesh, Method,
-    Motion, MotionKind, Point, Row, RowKind, Shape, Surface, Trajectory, Window,
+    Body, Contact, Counters, Culling, Cutter, Direction, Discretization, Distribution, Job, Local,
+    Mesh, Method, Motion, MotionKind, Point, Row, RowKind, Shape, Surface, SurfaceGrid, Trajectory,
+    Window,
 };
 
 use crate::error::{Error, Result};
@@ -254,21 +255,10 @@ pub fn row_from_wire(row: &wire::Row) -> Result<Row> {
 /// A body for the wire.
 pub fn body_to_wire(body: &Body) -> wire::Body {
     use wire::body::Shape as S;
-    let direction = |d: &Direction| {
-        Some(wire::Direction {
-            degree: d.degree as u32,
-            knots: d.knots.clone(),
-        })
-    };
     wire::Body {
         name: body.name.clone(),
         shape: Some(match &body.shape {
-            Shape::Surface(surface) => S::Surface(wire::Surface {
-                u: direction(surface.u()),
-                v: direction(surface.v()),
-                poles: pack_points(surface.poles()),
-                weights: surface.weights().unwrap_or_default().to_vec(),
-            }),
+            Shape::Surface(surface) => S::Surface(surface_to_wire(surface)),
             Shape::Mesh(mesh) => S::Mesh(wire::Mesh {
                 vertices: pack_points(mesh.vertices()),
                 triangles: pack_triangles(mesh.triangles()),
@@ -283,22 +273,9 @@ pub fn body_to_wire(body: &Body) -> wire::Body {
 /// [`Error::Missing`], [`Error::Ragged`] or [`Error::Core`].
 pub fn body_from_wire(body: wire::Body) -> Result<Body> {
     use wire::body::Shape as S;
-    let direction = |d: Option<wire::Direction>| {
-        let d = d.ok_or(missing("surface", "a direction"))?;
-        Ok::<_, Error>(Direction {
-            degree: d.degree as usize,
-            knots: d.knots,
-        })
-    };
     let name = body.name;
     let shape = match body.shape.ok_or(missing("body", "a shape"))? {
-        S::Surface(s) => Shape::Surface(Surface::new(
-            &name,
-            direction(s.u)?,
-            direction(s.v)?,
-            unpack_points(&s.poles)?,
-            (!s.weights.is_empty()).then_some(s.weights),
-        )?),
+        S::Surface(s) => Shape::Surface(surface_from_wire(&name, s)?),
         S::Mesh(m) => Shape::Mesh(Mesh::new(
             &name,
             unpack_points(&m.vertices)?,
@@ -306,6 +283,98 @@ pub fn body_from_wire(body: wire::Body) -> Result<Body> {
         )?),
     };
     Ok(Body { name, shape })
+}
+
+fn surface_to_wire(surface: &Surface) -> wire::Surface {
+    let direction = |d: &Direction| {
+        Some(wire::Direction {
+            degree: d.degree as u32,
+            knots: d.knots.clone(),
+        })
+    };
+    wire::Surface {
+        u: direction(surface.u()),
+        v: direction(surface.v()),
+        poles: pack_points(surface.poles()),
+        weights: surface.weights().unwrap_or_default().to_vec(),
+    }
+}
+
+fn surface_from_wire(name: &str, s: wire::Surface) -> Result<Surface> {
+    let direction = |d: Option<wire::Direction>| {
+        let d = d.ok_or(missing("surface", "a direction"))?;
+        Ok::<_, Error>(Direction {
+            degree: d.degree as usize,
+            knots: d.knots,
+        })
+    };
+    Ok(Surface::new(
+        name,
+        direction(s.u)?,
+        direction(s.v)?,
+        unpack_points(&s.poles)?,
+        (!s.weights.is_empty()).then_some(s.weights),
+    )?)
+}
+
+/// Rows to be made, for the wire.
+pub fn grid_to_wire(grid: &SurfaceGrid) -> wire::SurfaceGrid {
+    let (ids, us) = grid.us.iter().copied().unzip();
+    wire::SurfaceGrid {
+        name: grid.name.clone(),
+        surface: Some(surface_to_wire(&grid.surface)),
+        ids,
+        us,
+        vs: grid.vs.clone(),
+        last: grid.last,
+    }
+}
+
+/// Rows to be made, from the wire.
+///
+/// # Errors
+/// [`Error::Missing`], [`Error::Ragged`], [`Error::Incomplete`] or [`Error::Core`].
+pub fn grid_from_wire(grid: wire::SurfaceGrid) -> Result<SurfaceGrid> {
+    if grid.ids.len() != grid.us.len() {
+        return Err(Error::Incomplete {
+            what: "parameters of rows",
+            expected: grid.ids.len() as u64,
+            found: grid.us.len() as u64,
+        });
+    }
+    let surface = grid.surface.ok_or(missing("grid", "a surface"))?;
+    let surface = surface_from_wire(&grid.name, surface)?;
+    let grid = SurfaceGrid {
+        name: grid.name,
+        surface,
+        us: grid.ids.into_iter().zip(grid.us).collect(),
+        vs: grid.vs,
+        last: grid.last,
+    };
+    grid.validate()?;
+    Ok(grid)
+}
+
+/// A distribution for the wire.
+pub fn distribution_to_wire(distribution: Distribution) -> wire::Distribution {
+    match distribution {
+        Distribution::Overlap => wire::Distribution::Overlap,
+        Distribution::Halo => wire::Distribution::Halo,
+        Distribution::Surface => wire::Distribution::Surface,
+    }
+}
+
+/// A distribution from the wire.
+///
+/// # Errors
+/// [`Error::Missing`].
+pub fn distribution_from_wire(distribution: wire::Distribution) -> Result<Distribution> {
+    match distribution {
+        wire::Distribution::Overlap => Ok(Distribution::Overlap),
+        wire::Distribution::Halo => Ok(Distribution::Halo),
+        wire::Distribution::Surface => Ok(Distribution::Surface),
+        wire::Distribution::Unspecified => Err(missing("submission", "a distribution")),
+    }
 }
 
 fn pack_points(points: &[Point]) -> Bytes {
@@ -441,6 +510,32 @@ mod tests {
             shape: Shape::Mesh(mesh),
         };
         assert_eq!(body_from_wire(body_to_wire(&body)), Ok(body));
+    }
+
+    #[test]
+    fn grids_survive_the_wire_and_are_checked() {
+        let line = || Direction {
+            degree: 1,
+            knots: vec![0.0, 0.0, 1.0, 1.0],
+        };
+        let poles = vec![[0.0; 3], [0.0, 1.0, 0.0], [5.0, 0.0, 0.0], [5.0, 1.0, 0.0]];
+        let surface = Surface::new("s", line(), line(), poles, None).expect("valid");
+        let grid = SurfaceGrid {
+            name: "s".to_owned(),
+            surface,
+            us: vec![(4, 0.25), (7, 1.0)],
+            vs: vec![0.0, 0.1 + 0.2, 1.0],
+            last: 7,
+        };
+        let good = grid_to_wire(&grid);
+        assert_eq!(grid_from_wire(good.clone()), Ok(grid));
+        let bad = wire::SurfaceGrid {
+            ids: vec![4],
+            ..good.clone()
+        };
+        assert!(matches!(grid_from_wire(bad), Err(Error::Incomplete { .. })));
+        let bad = wire::SurfaceGrid { last: 6, ..good };
+        assert!(matches!(grid_from_wire(bad), Err(Error::Core(_))));
     }
 
     #[test]

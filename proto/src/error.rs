@@ -2,6 +2,7 @@
 
 use tonic::{Code, Status};
 
+use crate::task::TaskId;
 use crate::tls::Role;
 
 /// Everything that can be wrong with a message, and everything a service refuses.
@@ -96,6 +97,12 @@ pub enum Error {
         /// How long it was waited for.
         seconds: u64,
     },
+    /// Rows that this worker does not hold (any more).
+    #[error("the rows of {id} are not here")]
+    NotHeld {
+        /// By which they were asked for.
+        id: TaskId,
+    },
     /// The job failed on the cluster.
     #[error("{0}")]
     JobFailed(String),
@@ -122,7 +129,7 @@ impl Error {
             Self::Unproven => Code::Unauthenticated,
             Self::Forbidden { .. } => Code::PermissionDenied,
             Self::TooSlow { .. } => Code::DeadlineExceeded,
-            Self::UnknownWorker { .. } => Code::NotFound,
+            Self::UnknownWorker { .. } | Self::NotHeld { .. } => Code::NotFound,
             Self::JobFailed(_) => Code::Aborted,
             Self::ShuttingDown(_) => Code::Unavailable,
         }

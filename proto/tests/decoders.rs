@@ -76,7 +76,12 @@ fn good() -> Vec<Vec<u8>> {
         trajectory: Some(trajectory),
         first: 90,
         count: 90,
-        rows: 7,
+        runs: vec![wire::Run {
+            first: 90,
+            count: 90,
+            rows: vec![wire::Span { first: 3, count: 7 }],
+        }],
+        supply: Some(wire::task::Supply::Rows(7)),
     };
     let row = wire::Row {
         id: 7,
@@ -89,13 +94,22 @@ fn good() -> Vec<Vec<u8>> {
         degree: 1,
         knots: vec![0.0, 0.0, 1.0, 1.0],
     };
+    let surface = wire::Surface {
+        u: Some(direction.clone()),
+        v: Some(direction),
+        poles: numbers(12).into(),
+        weights: vec![1.0, 0.5, 1.0, 2.0],
+    };
+    let grid = wire::SurfaceGrid {
+        name: "g".to_owned(),
+        surface: Some(surface.clone()),
+        ids: vec![4, 5],
+        us: vec![0.25, 1.0],
+        vs: vec![0.0, 0.5, 1.0],
+        last: 5,
+    };
     let shapes = [
-        wire::body::Shape::Surface(wire::Surface {
-            u: Some(direction.clone()),
-            v: Some(direction),
-            poles: numbers(12).into(),
-            weights: vec![1.0, 0.5, 1.0, 2.0],
-        }),
+        wire::body::Shape::Surface(surface),
         wire::body::Shape::Mesh(wire::Mesh {
             vertices: numbers(9).into(),
             triangles: triangle.into(),
@@ -109,6 +123,7 @@ fn good() -> Vec<Vec<u8>> {
         job.encode_to_vec(),
         task.encode_to_vec(),
         row.encode_to_vec(),
+        grid.encode_to_vec(),
         horma_proto::pack_positions(5, &[None, None], &between).encode_to_vec(),
         // Rows in chunks: sizes first.
         [

@@ -1,13 +1,24 @@
 //! One digitizing worker: it makes itself known to the master, and digitizes what it is sent.
 //!
-//! A worker keeps nothing between tasks, so it may be killed at any time. It never decides what to
-//! compute, never opens a file, and never talks to a client.
+//! `work` digitizes a task, whatever its rows come from; `receive` takes in what is sent, `store` holds
+//! rows for the length of a job, `halo` gets those that other workers hold. What a worker holds, the
+//! master has too, so it may be killed at any time. It never decides what to compute, never opens a
+//! file, and never talks to a client.
 
 mod error;
+
 mod membership;
 mod service;
 
+mod receive;
+
+mod halo;
+mod store;
+
+mod work;
+
 use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::sync::Arc;
 use std::time::Duration;
 
 use horma_core::Simd;
@@ -60,9 +71,16 @@ pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationTo
         .num_threads(config.threads)
         .build()
         .map_err(Error::Threads)?;
+    let store = Arc::new(store::Store::default());
+    let means = work::Means {
+        pool: Arc::new(pool),
+        simd: config.simd,
+        store: store.clone(),
+        tls: config.tls.clone(),
+        shutdown: shutdown.clone(),
+    };
     let guard = Guard::of(config.tls.as_ref());
-    let service = service::Service::new(pool, config.simd, guard, shutdown.clone());
-    let service = WorkerServer::new(service)
+    let service = WorkerServer::new(service::Service { means, guard })
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
     let (tls, stopped) = (config.tls.clone(), shutdown.clone().cancelled_owned());
@@ -70,7 +88,7 @@ pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationTo
         tokio::spawn(
             async move { transport::serve(service, listener, tls.as_ref(), stopped).await },
         );
-    let outcome = membership::keep(&config, &address, &shutdown).await;
+    let outcome = membership::keep(&config, &address, &store, &shutdown).await;
     // Membership is what a worker lives for: without it there is nobody to serve.
     shutdown.cancel();
     // A task that does not notice is abandoned: the master gives its extent to another.

@@ -14,6 +14,7 @@ use tracing::{info, warn};
 
 use crate::Config;
 use crate::error::{Error, Result};
+use crate::store::Store;
 
 /// Pause before the master is tried again; it doubles up to the longest.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
@@ -27,6 +28,7 @@ const DEADLINE: Duration = Duration::from_secs(5);
 pub(crate) async fn keep(
     config: &Config,
     address: &str,
+    store: &Store,
     shutdown: &CancellationToken,
 ) -> Result<()> {
     let member = async {
@@ -36,10 +38,11 @@ pub(crate) async fn keep(
         let mut pause = FIRST_PAUSE;
         loop {
             let silence = match register(&mut client, config, address).await {
-                Ok(interval) => {
+                Ok((interval, master)) => {
                     info!(master = config.master, "registered");
+                    store.keep_master(master);
                     pause = FIRST_PAUSE;
-                    let silence = heartbeats(&mut client, config, interval).await;
+                    let silence = heartbeats(&mut client, config, store, interval).await;
                     heard = Some(Instant::now());
                     silence
                 }
@@ -105,12 +108,12 @@ fn silent(config: &Config, status: &Status, heard: bool) -> Result<String> {
     }
 }
 
-/// Registers; returns how often the master wants to hear.
+/// Registers; returns how often the master wants to hear, and which start of it this is.
 async fn register(
     client: &mut MasterClient<Channel>,
     config: &Config,
     address: &str,
-) -> std::result::Result<Duration, Status> {
+) -> std::result::Result<(Duration, u64), Status> {
     let request = RegisterRequest {
         version: VERSION.to_owned(),
         worker: config.id.clone(),
@@ -118,13 +121,15 @@ async fn register(
         address: address.to_owned(),
     };
     let reply = client.register(request).await?.into_inner();
-    Ok(Duration::from_millis(u64::from(reply.heartbeat_ms.max(10))))
+    let interval = Duration::from_millis(u64::from(reply.heartbeat_ms.max(10)));
+    Ok((interval, reply.master))
 }
 
-/// Sends heartbeats until one fails.
+/// Sends heartbeats until one fails; drops the rows of jobs that are over.
 async fn heartbeats(
     client: &mut MasterClient<Channel>,
     config: &Config,
+    store: &Store,
     interval: Duration,
 ) -> Status {
     loop {
@@ -133,8 +138,12 @@ async fn heartbeats(
             worker: config.id.clone(),
             incarnation: config.incarnation,
         };
-        if let Err(status) = client.heartbeat(request).await {
-            return status;
+        match client.heartbeat(request).await {
+            Ok(reply) => {
+                let reply = reply.into_inner();
+                store.keep_jobs(&reply.jobs, reply.next_job);
+            }
+            Err(status) => return status,
         }
     }
 }

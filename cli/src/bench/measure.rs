@@ -15,7 +15,7 @@ use rayon::ThreadPool;
 use super::check::same;
 use super::figures::{self, Density, Figures, Positions, Search, SimdLevel, Threads, Wheel};
 use super::turns::{Effort, Task, Walk, shortest};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::progress::Display;
 use crate::system;
 
@@ -43,7 +43,7 @@ const MOTIONS: [(f64, f64); 5] = [(4.0, 0.25), (2.0, 0.5), (1.0, 1.0), (0.5, 2.0
 pub(super) fn all(subject: &Subject, effort: &Effort, display: &Display) -> Result<Figures> {
     let load = system::load();
     let tell = |phase| display.tell(phase, 0, 0);
-    let one = threads(1)?;
+    let one = system::pool(1)?;
     tell("density");
     let (density, too_large) = densities(subject, effort, &one, display)?;
     let paper = Model::new(subject, GRID)?;
@@ -274,7 +274,7 @@ fn against_threads(subject: &Subject, effort: &Effort, model: &Model) -> Result<
     let cores = system::cores();
     let doubled = (0..).map(|k| 1 << k).take_while(|&n| n < cores);
     let counts: Vec<usize> = doubled.chain([cores]).collect();
-    let pools = counts.iter().map(|&n| threads(n));
+    let pools = counts.iter().map(|&n| system::pool(n));
     let pools: Vec<ThreadPool> = pools.collect::<Result<_>>()?;
     let with = (subject.cutter, subject.motion);
     let digitizer = model.digitizer(with, Contact::Facet, Method::Exact, Simd::best());
@@ -357,9 +357,4 @@ fn wheels(subject: &Subject, effort: &Effort) -> Result<Vec<Wheel>> {
         over_first: time / us[0],
     };
     Ok(cutters.iter().zip(&us).map(figure).collect())
-}
-
-fn threads(count: usize) -> Result<ThreadPool> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
-    pool.map_err(|e| Error::Threads(e.to_string()))
 }

@@ -205,8 +205,8 @@ fn keys_and_choices_that_are_unknown_are_refused_with_the_known_ones() {
     );
     refused(
         "\"overlap\"",
-        "\"halo\"",
-        "unknown distribution 'halo'; known: overlap",
+        "\"gossip\"",
+        "unknown distribution 'gossip'; known: overlap, halo, surface",
     );
     refused("direction", "dir", "unknown key `dir`");
 }

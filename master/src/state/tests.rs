@@ -10,27 +10,42 @@ fn name(worker: u8) -> String {
     format!("w{worker}")
 }
 
+fn submitted(job: u64, extents: u32) -> Event {
+    Event::Submitted {
+        job,
+        extents,
+        halos: None,
+    }
+}
+
+/// Extents of which each needs the rows of those up to `reach` away.
+fn neighbours(extents: u32, reach: u32) -> Vec<Vec<u32>> {
+    let near = |i: u32| (0..extents).filter(move |&j| i != j && i.abs_diff(j) <= reach);
+    (0..extents).map(|i| near(i).collect()).collect()
+}
+
 /// What may happen next, as a few small numbers that are made an event of the moment.
 #[derive(Debug, Clone)]
-enum Step {
+enum Happens {
     Register(u8, u64),
     Heartbeat(u8),
     Wait(u64),
-    Submit(u32),
+    /// So many extents, and how far they reach if their rows are placed.
+    Submit(u32, Option<u32>),
     Cancel(u64),
     Deliver(usize),
-    Fail(usize, bool),
+    Fail(usize, u8),
 }
 
-fn steps() -> impl Strategy<Value = Vec<Step>> {
+fn steps() -> impl Strategy<Value = Vec<Happens>> {
     let step = prop_oneof![
-        3 => (0..4u8, 0..3u64).prop_map(|(w, i)| Step::Register(w, i)),
-        2 => (0..4u8).prop_map(Step::Heartbeat),
-        1 => (0..12u64).prop_map(Step::Wait),
-        2 => (0..6u32).prop_map(Step::Submit),
-        1 => (0..4u64).prop_map(Step::Cancel),
-        6 => (0..8usize).prop_map(Step::Deliver),
-        3 => (0..8usize, any::<bool>()).prop_map(|(t, wrong)| Step::Fail(t, wrong)),
+        3 => (0..4u8, 0..3u64).prop_map(|(w, i)| Happens::Register(w, i)),
+        2 => (0..4u8).prop_map(Happens::Heartbeat),
+        1 => (0..12u64).prop_map(Happens::Wait),
+        2 => (0..6u32, prop::option::of(0..3u32)).prop_map(|(n, reach)| Happens::Submit(n, reach)),
+        1 => (0..4u64).prop_map(Happens::Cancel),
+        6 => (0..8usize).prop_map(Happens::Deliver),
+        3 => (0..8usize, 0..6u8).prop_map(|(t, how)| Happens::Fail(t, how)),
     ];
     prop::collection::vec(step, 1..120)
 }
@@ -38,15 +53,20 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 /// Holds after every event.
 fn check(state: &State) {
     let mut running = BTreeSet::new();
+    let mut placing = BTreeSet::new();
     for worker in state.workers.values() {
-        if let Some(task) = worker.task {
+        if let Some((task, step)) = worker.task {
+            let extent = &state.jobs[&task.job][task.extent as usize];
+            assert_eq!(extent.attempts, task.attempt);
+            let (set, what) = match step {
+                Step::Place => (&mut placing, extent.rows == Rows::OnTheWay),
+                Step::Digitize => (&mut running, extent.status == Status::Running),
+            };
+            assert!(what, "{step:?} {extent:?}");
             assert!(
-                running.insert((task.job, task.extent)),
+                set.insert((task.job, task.extent)),
                 "two workers, one extent"
             );
-            let extent = &state.jobs[&task.job][task.extent as usize];
-            let expected = (Status::Running, task.attempt);
-            assert_eq!((extent.status, extent.attempts), expected);
         }
     }
     for (&job, extents) in &state.jobs {
@@ -55,19 +75,41 @@ fn check(state: &State) {
             "a job is over when it is done"
         );
         for (i, extent) in (0u32..).zip(extents) {
-            let is_running = extent.status == Status::Running;
+            let is = |status| extent.status == status;
             assert_eq!(
-                is_running,
+                is(Status::Running),
                 running.contains(&(job, i)),
                 "running means someone runs it"
             );
+            assert_eq!(
+                extent.rows == Rows::OnTheWay,
+                placing.contains(&(job, i)),
+                "on the way means someone takes it"
+            );
+            if let Some(held) = extent.held() {
+                assert!(state.workers.contains_key(&held.worker), "held by a member");
+                assert!((held.id.job, held.id.extent) == (job, i) && held.id.attempt > 0);
+            }
             let may = |name: &String| {
                 let tried = |n: &String| extent.failed_by.contains(n);
                 !tried(name) || state.workers.keys().all(tried)
             };
             let idle = |(name, w): (&String, &Worker)| w.task.is_none() && may(name);
             let idle = state.workers.iter().any(idle);
-            let waits = extent.status == Status::Waiting;
+            let waits = match &extent.rows {
+                Rows::WithTask => is(Status::Waiting),
+                Rows::Nowhere => assign::wanted(extents)[i as usize],
+                Rows::OnTheWay => false,
+                Rows::Held(own) => {
+                    let ready =
+                        is(Status::Waiting) && assign::needed(extents, i as usize, own).is_some();
+                    assert!(
+                        !ready || state.workers[&own.worker].task.is_some(),
+                        "its holder idles while an extent waits"
+                    );
+                    false
+                }
+            };
             assert!(!(waits && idle), "nobody idles while an extent waits");
         }
     }
@@ -85,48 +127,62 @@ proptest! {
         let mut jobs: BTreeMap<u64, u32> = BTreeMap::new();
         let mut kept: BTreeSet<(u64, u32)> = BTreeSet::new();
         let mut ended = BTreeSet::new();
-        let mut started: Vec<(String, TaskId)> = Vec::new();
+        let mut started: Vec<(String, TaskId, Step, Vec<Held>)> = Vec::new();
         for step in steps {
             let pick = |i: usize| started.len().checked_sub(1 + i).map(|i| started[i].clone());
             let event = match step {
-                Step::Register(w, incarnation) => {
+                Happens::Register(w, incarnation) => {
                     Event::Registered { worker: name(w), incarnation }
                 }
-                Step::Heartbeat(w) => Event::Heartbeat { worker: name(w) },
-                Step::Wait(seconds) => {
+                Happens::Heartbeat(w) => Event::Heartbeat { worker: name(w) },
+                Happens::Wait(seconds) => {
                     now += Duration::from_secs(seconds);
                     Event::Tick
                 }
-                Step::Submit(extents) => {
+                Happens::Submit(extents, reach) => {
                     let job = jobs.len() as u64;
                     jobs.insert(job, extents);
-                    Event::Submitted { job, extents }
+                    let halos = reach.map(|reach| neighbours(extents, reach));
+                    Event::Submitted { job, extents, halos }
                 }
-                Step::Cancel(job) => {
+                Happens::Cancel(job) => {
                     if state.jobs.contains_key(&job) {
                         ended.insert(job);
                     }
                     Event::Cancelled { job }
                 }
                 // Late and repeated answers are as likely as current ones.
-                Step::Deliver(i) => match pick(i) {
-                    Some((worker, task)) => Event::Delivered { worker, task },
+                Happens::Deliver(i) => match pick(i) {
+                    Some((worker, task, Step::Place, _)) => Event::Placed { worker, task },
+                    Some((worker, task, Step::Digitize, _)) => Event::Delivered { worker, task },
                     None => Event::Tick,
                 },
-                Step::Fail(i, wrong) => match pick(i) {
-                    Some((worker, task)) => {
-                        let why = "of the test".to_owned();
-                        let fault = if wrong { Fault::Wrong(why) } else { Fault::Lost(why) };
-                        Event::Failed { worker, task, fault }
+                Happens::Fail(i, how) => match pick(i) {
+                    Some((worker, task, step, rows)) => {
+                        let reason = "of the test".to_owned();
+                        let fault = match (how, rows.last()) {
+                            (0, _) => Fault::Wrong(reason),
+                            (1..4, Some(held)) => Fault::Halo { source: held.id, reason },
+                            _ => Fault::Lost(reason),
+                        };
+                        Event::Failed { worker, task, step, fault }
                     }
                     None => Event::Tick,
                 },
             };
             for command in apply(&mut state, now, event) {
                 match command {
-                    Command::Start { worker, task } => {
+                    Command::Place { worker, task } => {
                         prop_assert!(state.workers.contains_key(&worker) || ended.contains(&task.job));
-                        started.push((worker, task));
+                        started.push((worker, task, Step::Place, Vec::new()));
+                    }
+                    Command::Start { worker, task, rows } => {
+                        prop_assert!(state.workers.contains_key(&worker) || ended.contains(&task.job));
+                        if let Some(own) = rows.first() {
+                            prop_assert_eq!(&own.worker, &worker);
+                            prop_assert_eq!(own.id.extent, task.extent);
+                        }
+                        started.push((worker, task, Step::Digitize, rows));
                     }
                     Command::Keep { task } => {
                         prop_assert!(!ended.contains(&task.job));
@@ -159,7 +215,9 @@ proptest! {
 
 fn starts(commands: &[Command]) -> Vec<(&str, u32, u32)> {
     let start = |c| match c {
-        &Command::Start { ref worker, task } => Some((worker.as_str(), task.extent, task.attempt)),
+        &Command::Start {
+            ref worker, task, ..
+        } => Some((worker.as_str(), task.extent, task.attempt)),
         _ => None,
     };
     commands.iter().filter_map(start).collect()
@@ -180,7 +238,7 @@ fn a_lost_workers_extent_goes_to_another() {
             },
         );
     }
-    let commands = apply(&mut state, now, Event::Submitted { job: 1, extents: 2 });
+    let commands = apply(&mut state, now, submitted(1, 2));
     assert_eq!(starts(&commands), [("a", 0, 1), ("b", 1, 1)]);
     let task = |extent, attempt| TaskId {
         job: 1,
@@ -190,6 +248,7 @@ fn a_lost_workers_extent_goes_to_another() {
     let failed = Event::Failed {
         worker: "a".to_owned(),
         task: task(0, 1),
+        step: Step::Digitize,
         fault: Fault::Lost("test".to_owned()),
     };
     assert!(
@@ -217,7 +276,7 @@ fn registering_again_does_not_interrupt_a_task() {
         incarnation: 1,
     };
     apply(&mut state, Duration::ZERO, register());
-    let submitted = Event::Submitted { job: 1, extents: 1 };
+    let submitted = submitted(1, 1);
     apply(&mut state, Duration::ZERO, submitted);
     let later = Duration::from_secs(9);
     assert!(apply(&mut state, later, register()).is_empty());
@@ -243,7 +302,7 @@ fn a_worker_that_cannot_be_reached_does_not_fail_a_job() {
             },
         );
     }
-    let submitted = Event::Submitted { job: 1, extents: 2 };
+    let submitted = submitted(1, 2);
     assert_eq!(
         starts(&apply(&mut state, now, submitted)),
         [("bad", 0, 1), ("good", 1, 1)]
@@ -256,6 +315,7 @@ fn a_worker_that_cannot_be_reached_does_not_fail_a_job() {
                 extent: 0,
                 attempt: 1,
             },
+            step: Step::Digitize,
             fault: Fault::Lost("no route".to_owned()),
         };
         assert!(apply(&mut state, now, failed).is_empty());
@@ -292,7 +352,7 @@ fn a_job_fails_when_nobody_is_left() {
             incarnation: 1,
         },
     );
-    apply(&mut state, at(0), Event::Submitted { job: 1, extents: 1 });
+    apply(&mut state, at(0), submitted(1, 1));
     let silent = apply(&mut state, at(11), Event::Tick);
     assert!(matches!(silent[..], [Command::Abort { .. }]));
     assert!(
@@ -315,7 +375,7 @@ fn a_worker_that_answered_wrongly_is_not_asked_again() {
         incarnation,
     };
     apply(&mut state, now, register(1));
-    apply(&mut state, now, Event::Submitted { job: 1, extents: 1 });
+    apply(&mut state, now, submitted(1, 1));
     let failed = Event::Failed {
         worker: "a".to_owned(),
         task: TaskId {
@@ -323,9 +383,214 @@ fn a_worker_that_answered_wrongly_is_not_asked_again() {
             extent: 0,
             attempt: 1,
         },
+        step: Step::Digitize,
         fault: Fault::Wrong("test".to_owned()),
     };
     apply(&mut state, now, failed);
     assert!(starts(&apply(&mut state, now, register(1))).is_empty());
     assert_eq!(starts(&apply(&mut state, now, register(2))), [("a", 0, 2)]);
+}
+
+/// The state with workers that are there, and a way to tell it what happens.
+fn with_workers(names: &[&str]) -> State {
+    let mut state = State::new(LEASE, Duration::ZERO);
+    for &name in names {
+        let worker = name.to_owned();
+        let incarnation = 1;
+        let registered = Event::Registered {
+            worker,
+            incarnation,
+        };
+        apply(&mut state, Duration::ZERO, registered);
+    }
+    state
+}
+
+/// What is to be done, in short.
+fn told(state: &mut State, event: Event) -> Vec<String> {
+    let commands = apply(state, Duration::ZERO, event);
+    let tell = |command| match command {
+        Command::Place { worker, task } => {
+            format!("place {}.{} on {worker}", task.extent, task.attempt)
+        }
+        Command::Start { worker, task, rows } => {
+            let rows = rows.iter();
+            let rows = rows.map(|h| format!("{}.{}@{}", h.id.extent, h.id.attempt, h.worker));
+            let rows = rows.collect::<Vec<_>>().join(" ");
+            format!("start {}.{} on {worker}: {rows}", task.extent, task.attempt)
+        }
+        Command::Abort { task, .. } => format!("abort {}.{}", task.extent, task.attempt),
+        Command::Keep { task } => format!("keep {}.{}", task.extent, task.attempt),
+        Command::Complete { .. } => "complete".to_owned(),
+        Command::Fail { error, .. } => format!("fail: {error}"),
+    };
+    commands.into_iter().map(tell).collect()
+}
+
+fn task(extent: u32, attempt: u32) -> TaskId {
+    let job = 1;
+    TaskId {
+        job,
+        extent,
+        attempt,
+    }
+}
+
+fn halo_job(extents: u32) -> Event {
+    Event::Submitted {
+        job: 1,
+        extents,
+        halos: Some(neighbours(extents, 1)),
+    }
+}
+
+fn placed(worker: &str, extent: u32, attempt: u32) -> Event {
+    let worker = worker.to_owned();
+    let task = task(extent, attempt);
+    Event::Placed { worker, task }
+}
+
+fn delivered(worker: &str, extent: u32, attempt: u32) -> Event {
+    let worker = worker.to_owned();
+    let task = task(extent, attempt);
+    Event::Delivered { worker, task }
+}
+
+fn halo_lost(worker: &str, extent: u32, attempt: u32, source: TaskId) -> Event {
+    Event::Failed {
+        worker: worker.to_owned(),
+        task: task(extent, attempt),
+        step: Step::Digitize,
+        fault: Fault::Halo {
+            source,
+            reason: "test".to_owned(),
+        },
+    }
+}
+
+#[test]
+fn an_extent_starts_once_all_that_it_needs_is_placed() {
+    let mut state = with_workers(&["a", "b"]);
+    let begin = told(&mut state, halo_job(3));
+    assert_eq!(begin, ["place 0.1 on a", "place 1.1 on b"]);
+    // Fewer workers than extents: one holds two, and nothing starts before they are placed.
+    let more = told(&mut state, placed("a", 0, 1));
+    assert_eq!(more, ["place 2.1 on a"]);
+    assert!(told(&mut state, placed("b", 1, 1)).is_empty());
+    assert_eq!(
+        told(&mut state, placed("a", 2, 1)),
+        [
+            "start 0.1 on a: 0.1@a 1.1@b",
+            "start 1.1 on b: 1.1@b 0.1@a 2.1@a"
+        ]
+    );
+    assert_eq!(
+        told(&mut state, delivered("a", 0, 1)),
+        ["keep 0.1", "start 2.1 on a: 2.1@a 1.1@b"]
+    );
+    assert_eq!(told(&mut state, delivered("b", 1, 1)), ["keep 1.1"]);
+    let end = told(&mut state, delivered("a", 2, 1));
+    assert_eq!(end, ["keep 2.1", "complete"]);
+}
+
+#[test]
+fn rows_that_cannot_be_had_are_placed_elsewhere_and_their_holder_stays() {
+    let mut state = with_workers(&["a", "b", "c"]);
+    told(&mut state, halo_job(2));
+    told(&mut state, placed("a", 0, 1));
+    told(&mut state, placed("b", 1, 1));
+    // The holder was digitizing the extent itself: that goes to the new one with the rows.
+    assert_eq!(
+        told(&mut state, halo_lost("b", 1, 1, task(0, 1))),
+        ["abort 0.1", "place 0.2 on c"]
+    );
+    assert!(state.knows("a", 1) && state.knows("b", 1));
+    assert_eq!(
+        told(&mut state, placed("c", 0, 2)),
+        ["start 0.2 on c: 0.2@c 1.1@b", "start 1.2 on b: 1.1@b 0.2@c"]
+    );
+    // Who asked for rows that have moved on since asks again, and nobody is to blame.
+    assert_eq!(
+        told(&mut state, halo_lost("b", 1, 2, task(0, 1))),
+        ["start 1.3 on b: 1.1@b 0.2@c"]
+    );
+}
+
+#[test]
+fn rows_of_a_done_extent_are_placed_again_if_others_need_them() {
+    let mut state = with_workers(&["a", "b", "c"]);
+    told(&mut state, halo_job(3));
+    for (worker, extent) in [("a", 0), ("b", 1), ("c", 2)] {
+        told(&mut state, placed(worker, extent, 1));
+    }
+    assert_eq!(told(&mut state, delivered("a", 0, 1)), ["keep 0.1"]);
+    assert_eq!(told(&mut state, delivered("c", 2, 1)), ["keep 2.1"]);
+    let started_anew = Event::Registered {
+        worker: "a".to_owned(),
+        incarnation: 2,
+    };
+    assert_eq!(told(&mut state, started_anew), ["place 0.2 on a"]);
+    // It got the rows in time after all: nobody is left busy with a job that is over.
+    let end = told(&mut state, delivered("b", 1, 1));
+    assert_eq!(end, ["keep 1.1", "abort 0.2", "complete"]);
+    assert!(state.workers.values().all(|w| w.task.is_none()));
+}
+
+/// Two workers that reach the master but not each other: one of them does it all.
+#[test]
+fn a_pair_that_is_cut_off_from_each_other_ends_its_job() {
+    let mut state = with_workers(&["a", "b"]);
+    told(&mut state, halo_job(2));
+    told(&mut state, placed("a", 0, 1));
+    told(&mut state, placed("b", 1, 1));
+    assert_eq!(
+        told(&mut state, halo_lost("a", 0, 1, task(1, 1))),
+        ["abort 1.1", "place 1.2 on a"]
+    );
+    let stale = told(&mut state, halo_lost("b", 1, 1, task(0, 1)));
+    assert!(stale.is_empty(), "{stale:?}");
+    assert_eq!(
+        told(&mut state, placed("a", 1, 2)),
+        ["start 0.2 on a: 0.1@a 1.2@a"]
+    );
+    assert_eq!(
+        told(&mut state, delivered("a", 0, 2)),
+        ["keep 0.2", "start 1.2 on a: 1.2@a 0.1@a"]
+    );
+    let end = told(&mut state, delivered("a", 1, 2));
+    assert_eq!(end, ["keep 1.2", "complete"]);
+}
+
+/// Rows that nobody can serve to anybody fail the job, and say so.
+#[test]
+fn rows_that_are_lost_too_often_fail_the_job() {
+    let mut state = with_workers(&["a", "b"]);
+    told(&mut state, halo_job(2));
+    told(&mut state, placed("a", 0, 1));
+    told(&mut state, placed("b", 1, 1));
+    let (mut done, mut told_last) = (false, Vec::new());
+    for _ in 0..100 {
+        // Whoever runs an extent loses the other's rows; whoever is to hold rows takes them.
+        let busy = state
+            .workers
+            .iter()
+            .find_map(|(name, w)| Some((name.clone(), w.task?)));
+        let Some((name, (id, step))) = busy else {
+            done = true;
+            break;
+        };
+        told_last = match step {
+            Step::Place => told(&mut state, placed(&name, id.extent, id.attempt)),
+            Step::Digitize => {
+                let other = state.jobs[&1][1 - id.extent as usize].held();
+                let source = other.map_or(task(1 - id.extent, 1), |held| held.id);
+                told(&mut state, halo_lost(&name, id.extent, id.attempt, source))
+            }
+        };
+    }
+    assert!(done, "{told_last:?}");
+    assert!(
+        told_last.iter().any(|c| c.contains("fail: extent")),
+        "{told_last:?}"
+    );
 }

@@ -10,10 +10,11 @@ use prost::Message;
 pub type Decoder = fn(&[u8]);
 
 /// All of them, by name.
-pub const DECODERS: [(&str, Decoder); 6] = [
+pub const DECODERS: [(&str, Decoder); 7] = [
     ("job", job),
     ("row", row),
     ("body", body),
+    ("grid", grid),
     ("positions", positions),
     ("chunks", chunks),
     ("task", task),
@@ -44,6 +45,15 @@ pub fn body(bytes: &[u8]) {
     };
     let again = horma_proto::body_from_wire(horma_proto::body_to_wire(&body));
     assert_eq!(again, Ok(body));
+}
+
+/// What a worker makes rows from.
+pub fn grid(bytes: &[u8]) {
+    let Ok(Ok(grid)) = wire::SurfaceGrid::decode(bytes).map(horma_proto::grid_from_wire) else {
+        return;
+    };
+    let again = horma_proto::grid_from_wire(horma_proto::grid_to_wire(&grid));
+    assert_eq!(again, Ok(grid));
 }
 
 /// Positions as they come from a worker: as they are, and with a checksum that holds.
