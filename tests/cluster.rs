@@ -178,10 +178,12 @@ fn what_is_inserted_is_the_same_on_any_number_of_workers() {
         let expected = inserted("alone");
         assert!(expected > Some(1000), "{expected:?}");
         for count in ["1", "2", "3", "5"] {
-            let args = [&given[..], &["--workers", count]].concat();
-            let path = path_of(&sample(), dir.path(), count, &args);
-            assert!(path == alone, "{more:?} on {count} workers");
-            assert_eq!(inserted(count), expected);
+            for distribution in DISTRIBUTIONS {
+                let how = ["--workers", count, "--distribution", distribution];
+                let path = path_of(&sample(), dir.path(), count, &[&given[..], &how].concat());
+                assert!(path == alone, "{more:?} {how:?}");
+                assert_eq!(inserted(count), expected);
+            }
         }
         let args = [&given[..], &["--threads", "1"]].concat();
         assert!(path_of(&sample(), dir.path(), "thread", &args) == alone);
@@ -201,7 +203,7 @@ fn what_is_inserted_is_the_same_on_any_number_of_workers() {
         succeed(&submit);
         assert!(std::fs::read(out.join("path.csv")).expect("a path") == alone);
     }
-    // Extents narrower than the cutter, rings, brute force.
+    // Extents narrower than the cutter, brute force.
     let coarse = [
         "--step",
         "40",
@@ -211,7 +213,12 @@ fn what_is_inserted_is_the_same_on_any_number_of_workers() {
         "0.02",
     ];
     let alone = path_of(&sample(), dir.path(), "coarse", &coarse);
-    let others: [&[&str]; 2] = [&["--workers", "8"], &["--method", "brute"]];
+    let others: [&[&str]; 4] = [
+        &["--workers", "8"],
+        &["--workers", "8", "--distribution", "halo"],
+        &["--workers", "8", "--distribution", "surface"],
+        &["--method", "brute"],
+    ];
     for more in others {
         let other = path_of(
             &sample(),
