@@ -100,7 +100,10 @@ pub fn split(trajectory: &Trajectory, outlines: &[Outline], job: &Job, parts: u3
             id,
             first,
             count,
-            rows: rows_within(outlines, seen(trajectory, job, first, count).widened(w)),
+            rows: rows_within(
+                outlines,
+                seen(trajectory, job, first..first + count).widened(w),
+            ),
             ..Extent::default()
         }
     };
@@ -110,13 +113,13 @@ pub fn split(trajectory: &Trajectory, outlines: &[Outline], job: &Job, parts: u3
 }
 
 /// The travel of positions, and of the one that their last move ends at where positions are inserted.
-fn seen(trajectory: &Trajectory, job: &Job, first: u64, count: u64) -> Interval {
-    let end = first + count;
+fn seen(trajectory: &Trajectory, job: &Job, positions: Range<u64>) -> Interval {
+    let Range { start, end } = positions;
     let end = match job.motion.path_tolerance {
         Some(_) => trajectory.positions.min(end + 1),
         None => end,
     };
-    trajectory.travel_of(first, end - first)
+    trajectory.travel_of(start, end - start)
 }
 
 /// Gives each row to that of the extents that need it to which its middle is nearest.
@@ -168,7 +171,7 @@ pub(crate) fn interior_first(
         let x = strip.map_or(outlines[row as usize].x, |s| {
             s.hull(outlines[row as usize].x)
         });
-        let clear = |i| seen(trajectory, job, i, 1).high + w < x.low;
+        let clear = |i| seen(trajectory, job, i..i + 1).high + w < x.low;
         let from = partition(begin, end, clear);
         let to = partition(begin, end, |i| trajectory.travel(i) - w <= x.high);
         edges.push((from, to));
@@ -184,16 +187,7 @@ pub(crate) fn interior_first(
     let run = |positions: Range<u64>| Run {
         first: positions.start,
         count: positions.end - positions.start,
-        rows: rows_within(
-            outlines,
-            seen(
-                trajectory,
-                job,
-                positions.start,
-                positions.end - positions.start,
-            )
-            .widened(w),
-        ),
+        rows: rows_within(outlines, seen(trajectory, job, positions).widened(w)),
     };
     let inner = run(interior.clone());
     let needs_no_others = inner
@@ -407,7 +401,7 @@ mod tests {
                     prop_assert_eq!(run.first, next);
                     prop_assert!(run.count > 0);
                     next += run.count;
-                    let within = seen(&trajectory, &job, run.first, run.count);
+                    let within = seen(&trajectory, &job, run.first..run.first + run.count);
                     let within = within.widened(job.cutter.half_width() + REACH_SLACK);
                     prop_assert_eq!(&run.rows, &rows_within(&outlines, within));
                     prop_assert!(run.rows.iter().all(|r| e.rows.contains(r)));

@@ -351,11 +351,8 @@ impl Driver {
         job.calls.remove(&task);
         let inserted = job.inserted.load(Ordering::Relaxed);
         if let Err(error) = job.plan.check_inserted(inserted) {
-            warn!(job = task.job, %error, "failed");
             self.apply(Event::Cancelled { job: task.job }, None);
-            if let Some(job) = self.jobs.remove(&task.job) {
-                let _ = job.reply.send(Err(Error::Plan(error)));
-            }
+            self.fail(task.job, Error::Plan(error));
             return;
         }
         match outcome {
@@ -407,13 +404,16 @@ impl Driver {
                         job.complete();
                     }
                 }
-                Command::Fail { job, error } => {
-                    warn!(job, %error, "failed");
-                    if let Some(job) = self.jobs.remove(&job) {
-                        let _ = job.reply.send(Err(error));
-                    }
-                }
+                Command::Fail { job, error } => self.fail(job, error),
             }
+        }
+    }
+
+    /// Tells whoever waits for a job that it came to nothing.
+    fn fail(&mut self, job: u64, error: Error) {
+        warn!(job, %error, "failed");
+        if let Some(job) = self.jobs.remove(&job) {
+            let _ = job.reply.send(Err(error));
         }
     }
 
@@ -424,22 +424,14 @@ impl Driver {
         else {
             return;
         };
-        let (call, cut_off) = oneshot::channel();
-        job.calls.insert(task, call);
-        job.workers.insert(worker.clone(), address.clone());
+        let cut_off = job.call(task, &worker, address);
         let placing = job.placing(task, address, self.incarnation, self.config.tls.clone());
         info!(%task, worker, rows = placing.rows.len(), "placing");
-        let inbox = self.inbox.clone();
-        tokio::spawn(async move {
-            let outcome = place(placing, cut_off).await;
-            if let Some(inbox) = inbox.upgrade() {
-                let placed = Message::Placed {
-                    worker,
-                    task,
-                    outcome,
-                };
-                // The driver may have stopped: then nobody waits for this.
-                let _ = inbox.send(placed).await;
+        self.report_when_over(async move {
+            Message::Placed {
+                worker,
+                task,
+                outcome: place(placing, cut_off).await,
             }
         });
     }
@@ -451,9 +443,7 @@ impl Driver {
         else {
             return;
         };
-        let (call, cut_off) = oneshot::channel();
-        job.calls.insert(task, call);
-        job.workers.insert(worker.clone(), address.clone());
+        let cut_off = job.call(task, &worker, address);
         let located = |held: Held| {
             let address = self.addresses.get(&held.worker).cloned();
             (held, address.unwrap_or_default())
@@ -462,17 +452,23 @@ impl Driver {
         let tls = self.config.tls.clone();
         let attempt = job.attempt(task, &worker, address, holders, tls);
         info!(%task, worker, positions = attempt.extent.count, "started");
+        self.report_when_over(async move {
+            Message::Over {
+                worker,
+                task,
+                outcome: dispatch(attempt, cut_off).await,
+            }
+        });
+    }
+
+    /// Has the driver told what comes of a call.
+    fn report_when_over(&self, message: impl Future<Output = Message> + Send + 'static) {
         let inbox = self.inbox.clone();
         tokio::spawn(async move {
-            let outcome = dispatch(attempt, cut_off).await;
+            let message = message.await;
             if let Some(inbox) = inbox.upgrade() {
-                let over = Message::Over {
-                    worker,
-                    task,
-                    outcome,
-                };
                 // The driver may have stopped: then nobody waits for this.
-                let _ = inbox.send(over).await;
+                let _ = inbox.send(message).await;
             }
         });
     }

@@ -37,7 +37,7 @@ pub(crate) struct RunningJob {
     lost: Vec<LostAttempt>,
     /// Calls under way: each ends when it is told why, or when the job is dropped.
     pub calls: BTreeMap<TaskId, oneshot::Sender<String>>,
-    pub workers: BTreeMap<String, String>,
+    workers: BTreeMap<String, String>,
     pub reply: Reply,
 }
 
@@ -72,6 +72,14 @@ impl RunningJob {
             Distribution::Overlap | Distribution::Surface => None,
             Distribution::Halo => Some(self.extents.iter().map(halo).collect()),
         }
+    }
+
+    /// Writes down a call that begins; it ends early when it is told why, by what this returns.
+    pub fn call(&mut self, task: TaskId, worker: &str, address: &str) -> oneshot::Receiver<String> {
+        let (call, cut_off) = oneshot::channel();
+        self.calls.insert(task, call);
+        self.workers.insert(worker.to_owned(), address.to_owned());
+        cut_off
     }
 
     /// What placing an extent's own rows takes.

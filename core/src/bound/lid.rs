@@ -385,6 +385,20 @@ mod tests {
         }
     }
 
+    /// Points drawn together and moved along the spindle, and a lid over them in the fourth lane.
+    fn under_a_lid(points: &[Point], shrink: f64, far: f64) -> (Vec<Point>, Frame, Lids) {
+        let points: Vec<Point> = points
+            .iter()
+            .map(|p| add_scaled(points[0], shrink, sub(*p, points[0])))
+            .map(|p| [p[0] + far, p[1], p[2]])
+            .collect();
+        let across = points.iter().map(|p| p[1].hypot(p[2])).fold(0.0, f64::max);
+        let frame = Frame::new(Interval::of(points.iter().map(|p| p[0])), across);
+        let mut held = Lids::EMPTY;
+        held.set(3, &frame, &points);
+        (points, frame, held)
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
@@ -400,15 +414,7 @@ mod tests {
         ) {
             let cutter = cutter(which);
             let pose = pose(x + far, f64::from(degrees));
-            let points: Vec<Point> = points
-                .iter()
-                .map(|p| add_scaled(points[0], shrink, sub(*p, points[0])))
-                .map(|p| [p[0] + far, p[1], p[2]])
-                .collect();
-            let across = points.iter().map(|p| p[1].hypot(p[2])).fold(0.0, f64::max);
-            let frame = Frame::new(Interval::of(points.iter().map(|p| p[0])), across);
-            let mut held = Lids::EMPTY;
-            held.set(3, &frame, &points);
+            let (points, frame, held) = under_a_lid(&points, shrink, far);
             let view = View::new(&frame, &cutter, &pose);
             for level in Level::available() {
                 let bounds = with_simd!(level, simd => lids(simd, &cutter, &view, place, &held));
@@ -437,15 +443,7 @@ mod tests {
             let poses: [Pose; LANES] = std::array::from_fn(|k| {
                 pose(x + far + step * k as f64, f64::from(degrees) + by * k as f64)
             });
-            let points: Vec<Point> = points
-                .iter()
-                .map(|p| add_scaled(points[0], shrink, sub(*p, points[0])))
-                .map(|p| [p[0] + far, p[1], p[2]])
-                .collect();
-            let across = points.iter().map(|p| p[1].hypot(p[2])).fold(0.0, f64::max);
-            let frame = Frame::new(Interval::of(points.iter().map(|p| p[0])), across);
-            let mut held = Lids::EMPTY;
-            held.set(3, &frame, &points);
+            let (points, frame, held) = under_a_lid(&points, shrink, far);
             let view = View::new(&frame, &cutter, &poses[0]);
             let swing = Swing::new(poses.into_iter());
             for level in Level::available() {
