@@ -74,7 +74,7 @@ fn check_table(name: &str, part: &Path, axis: &str, distributions: &[&str]) {
             }
         }
     }
-    println!("{table}");
+    eprintln!("{table}");
     assert!(different.is_empty(), "{name}: {different:#?}");
 }
 
