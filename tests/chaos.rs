@@ -80,6 +80,7 @@ impl Plan {
             _ => &["overlap", "halo", "surface"],
         };
         let from_worker = rng.bool();
+        let early = [600, 4000][rng.usize(..2)];
         Self {
             fault,
             // Rows that were fetched before a partition are not missed.
@@ -95,7 +96,8 @@ impl Plan {
                 _ => rng.usize(..WORKERS),
             },
             mended: rng.bool(),
-            bit: rng.u64(..8 * 4000),
+            // Headers come first.
+            bit: 8 * rng.u64(..early) + rng.u64(..8),
             from_worker,
         }
     }

@@ -207,7 +207,7 @@ impl Worker for Liar {
         let mut task = None;
         while let Some(request) = requests.message().await? {
             if let Some(wire::digitize_request::Kind::Task(header)) = request.kind {
-                task = Some(header);
+                task = Some(horma_proto::open(&header)?);
             }
         }
         let replies = (self.0)(task.expect("a task comes first"));

@@ -167,7 +167,8 @@ fn requests(
         supply: Some(supply),
     };
     let sent = attempt.coming.sent.clone();
-    let requests = std::iter::once(Request::Task(task)).chain(chunks.map(Request::Rows));
+    let requests =
+        std::iter::once(Request::Task(horma_proto::seal(&task))).chain(chunks.map(Request::Rows));
     tokio_stream::iter(requests.map(move |kind| {
         let request = DigitizeRequest { kind: Some(kind) };
         sent.fetch_add(request.encoded_len() as u64, Ordering::Relaxed);

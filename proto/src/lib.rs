@@ -23,8 +23,8 @@ pub mod wire {
     tonic::include_proto!("horma.cluster.v1");
 }
 
-pub use chunk::{CHUNK_BYTES, Chunks, Messages};
-pub use chunk::{pack_positions, position_chunks, unpack_positions};
+pub use chunk::{CHUNK_BYTES, Chunks, Messages, open, seal};
+pub use chunk::{checksum, pack_positions, position_chunks, unpack_positions};
 pub use convert::{body_from_wire, body_to_wire, job_from_wire, job_to_wire};
 pub use convert::{counters_from_wire, counters_to_wire};
 pub use convert::{distribution_from_wire, distribution_to_wire, grid_from_wire, grid_to_wire};

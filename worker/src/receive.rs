@@ -88,7 +88,7 @@ pub(crate) async fn task(
     let Some(Request::Task(header)) = requests.message().await?.and_then(|r| r.kind) else {
         return Err(no_header("task").into());
     };
-    let mut task = header_from_wire(header)?;
+    let mut task = header_from_wire(horma_proto::open(&header)?)?;
     let (mut rows, mut grids) = (Rows::default(), (Messages::default(), Vec::new()));
     while let Some(request) = requests.message().await? {
         match (request.kind, &task.announced) {

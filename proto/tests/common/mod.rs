@@ -63,8 +63,7 @@ pub fn positions(bytes: &[u8]) {
     };
     // Nearly always refused.
     let _ = horma_proto::unpack_positions(&positions, u64::MAX);
-    let crc = crc32c::crc32c(&positions.touches);
-    positions.crc32c = crc32c::crc32c_append(crc, &positions.between);
+    positions.crc32c = horma_proto::checksum(&positions);
     let Ok(run) = horma_proto::unpack_positions(&positions, u64::MAX) else {
         return;
     };
