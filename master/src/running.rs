@@ -2,23 +2,24 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use horma_core::{
-    Counters, Distribution, Extent, ExtentRecord, Handout, LostAttempt, Record, SubTrajectory,
-    Traffic, WorkerRecord,
+    Counters, Distribution, Extent, Handout, LostAttempt, Record, SubTrajectory, Traffic,
+    WorkerRecord,
 };
 use horma_proto::{TaskId, Tls};
 use tokio::sync::oneshot;
 
 use crate::Progress;
-use crate::dispatch::Attempt;
+use crate::dispatch::{Attempt, Delivery};
 use crate::error::Result;
+use crate::journal::{Journal, Kept, Resumed};
 use crate::place::{Placed, Placing};
 use crate::state::{Fault, Held};
 
 /// Who waits for a job.
-type Reply = oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>;
+pub(crate) type Reply = oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>;
 
 pub(crate) struct RunningJob {
     pub plan: Arc<Handout>,
@@ -31,7 +32,11 @@ pub(crate) struct RunningJob {
     /// Inserted positions that have arrived.
     pub inserted: Arc<AtomicU64>,
     /// What was delivered and kept, by extent.
-    pub kept: BTreeMap<u32, (Vec<SubTrajectory>, ExtentRecord)>,
+    pub kept: BTreeMap<u32, Kept>,
+    /// Where that is written down, if it is.
+    journal: Option<Journal>,
+    /// How much of it was in the journal already.
+    from_journal: u32,
     /// What placing rows has taken so far, by extent.
     pub placed: BTreeMap<u32, Placed>,
     lost: Vec<LostAttempt>,
@@ -42,21 +47,35 @@ pub(crate) struct RunningJob {
 }
 
 impl RunningJob {
-    /// Splits a plan into at most `parts` extents.
-    pub fn new(plan: Arc<Handout>, parts: u32, progress: Progress, reply: Reply) -> Self {
+    /// Splits a plan into at most `parts` extents, some of which may be there already.
+    pub fn new(
+        plan: Arc<Handout>,
+        parts: u32,
+        resumed: Option<Resumed>,
+        progress: Progress,
+        reply: Reply,
+    ) -> Self {
         let extents = plan.split(parts);
         let mut users = vec![0; plan.outlines.len()];
         for &row in extents.iter().flat_map(|e| &e.rows) {
             users[row as usize] += 1;
         }
+        let (journal, kept) = resumed.map_or((None, BTreeMap::new()), |resumed| {
+            (Some(resumed.journal), resumed.kept)
+        });
+        let runs = || kept.values().flat_map(|(runs, _)| runs.iter());
+        let arrived: usize = runs().map(|run| run.touches.len()).sum();
+        let inserted: usize = runs().map(|run| run.between.len()).sum();
         Self {
             plan,
             extents,
             users,
             progress,
-            arrived: Arc::default(),
-            inserted: Arc::default(),
-            kept: BTreeMap::new(),
+            arrived: Arc::new(AtomicU64::new(arrived as u64)),
+            inserted: Arc::new(AtomicU64::new(inserted as u64)),
+            from_journal: kept.len() as u32,
+            kept,
+            journal,
             placed: BTreeMap::new(),
             lost: Vec::new(),
             calls: BTreeMap::new(),
@@ -120,6 +139,21 @@ impl RunningJob {
         }
     }
 
+    /// Tells whoever waits how far it is.
+    pub fn tell_progress(&self) {
+        let arrived = self.arrived.load(Ordering::Relaxed);
+        (self.progress)("digitize", arrived, self.plan.trajectory.positions);
+    }
+
+    /// Keeps an extent, and has it written down.
+    pub fn keep(&mut self, extent: u32, delivery: Delivery) {
+        let kept = (Arc::new(delivery.positions), delivery.record);
+        if let Some(journal) = &self.journal {
+            journal.keep(extent, kept.clone());
+        }
+        self.kept.insert(extent, kept);
+    }
+
     /// Writes down an attempt that came to nothing.
     pub fn lose(&mut self, worker: &str, task: TaskId, fault: &Fault, positions_received: u64) {
         self.lost.push(LostAttempt {
@@ -150,7 +184,7 @@ impl RunningJob {
             traffic.bytes_between_workers += record.bytes_fetched;
             traffic.bytes_of_results += record.bytes_received;
             counters += record.counters;
-            parts.extend(positions);
+            parts.extend(Arc::unwrap_or_clone(positions));
             extents.push(record);
         }
         let worker = |(worker, address)| WorkerRecord { worker, address };
@@ -159,6 +193,7 @@ impl RunningJob {
             traffic: Some(traffic),
             workers: self.workers.into_iter().map(worker).collect(),
             extents,
+            extents_from_journal: self.from_journal,
             lost: self.lost,
             ..Record::default()
         };
