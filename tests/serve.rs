@@ -299,6 +299,7 @@ async fn a_submission_that_comes_twice_is_one_job() {
 /// Sends a job of one small mesh with a key.
 async fn submit_raw(address: &str, key: u8) -> Result<u64, Status> {
     let mesh = horma_core::Mesh::new(
+        "mesh",
         vec![[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [0.0, 5.0, 0.0]],
         vec![[0, 1, 2]],
     );
@@ -369,8 +370,8 @@ async fn what_is_beyond_a_limit_is_refused_with_what_to_do() {
 #[test]
 fn a_result_for_which_there_is_no_room_is_dropped_unless_somebody_waits_for_it() {
     let dir = scratch();
-    let job = short_job(dir.path());
-    let alone = path_of(&job, dir.path(), "alone", &[]);
+    let job = long_job(dir.path());
+    let alone = path_of(&job, dir.path(), "alone", &["--method", "exact"]);
     let (mut master, address) = master(&["--keep-mb", "0"]);
     let _worker = worker(&address, "w");
     let out = dir.path().join("out");
