@@ -91,6 +91,8 @@ fn check_killed(distribution: &str) {
     b.wait_for(&["positions", "first="]);
     b.signal("-STOP");
     first.wait_for(&["journalled"]);
+    // Nor may it help the other to an end meanwhile.
+    a.signal("-STOP");
     assert_eq!(status(&address, &id)["stage"], "running", "not all is done");
     first.signal("-KILL");
     let (code, before) = first.end();
@@ -98,6 +100,7 @@ fn check_killed(distribution: &str) {
     let journalled = before.matches("journalled job=").count() as u64;
 
     let mut second = again(&address, &store, &[]);
+    a.signal("-CONT");
     b.signal("-CONT");
     second.wait_for(&["resumed from the journal"]);
     let out = dir.path().join("out");

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use horma_proto::transport::{self, Trouble, WANTS_TLS};
+use horma_proto::wire::StatusRequest;
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::{Answer, MAX_MESSAGE, Role, Tls};
 use tokio::time::Instant;
@@ -17,7 +18,7 @@ const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
 /// Longest time for a call that has a short answer.
-pub(crate) const DEADLINE: Duration = Duration::from_secs(30);
+const DEADLINE: Duration = Duration::from_secs(30);
 
 pub(crate) type Client = MasterClient<Channel>;
 
@@ -48,7 +49,10 @@ impl Remote {
         let mut pause = FIRST_PAUSE;
         loop {
             let outcome = match self.connect().await {
-                Ok(client) => {
+                Ok(mut client) => {
+                    if heard.is_none() {
+                        self.greet(&mut client).await?;
+                    }
                     let before = *heard.get_or_insert_with(Instant::now);
                     let mut latest = before;
                     let outcome = call(client, &mut latest).await;
@@ -78,6 +82,16 @@ impl Remote {
         Ok(MasterClient::new(channel)
             .max_decoding_message_size(MAX_MESSAGE)
             .max_encoding_message_size(MAX_MESSAGE))
+    }
+
+    /// Makes sure that it is a master that took the connection: there is no job 0.
+    async fn greet(&self, client: &mut Client) -> Result<()> {
+        match client.status(short(StatusRequest { job: Some(0) })).await {
+            Err(status) if Answer::of(&status) != Answer::Stranger => {
+                Err(self.meaning(status.into()))
+            }
+            Ok(_) | Err(_) => Ok(()),
+        }
     }
 
     fn meaning(&self, failure: Failure) -> Error {
