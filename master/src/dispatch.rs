@@ -16,6 +16,7 @@ use prost::Message;
 use tokio::sync::oneshot;
 use tonic::transport::Channel;
 use tonic::{Status, Streaming};
+use tracing::debug;
 
 use crate::Progress;
 use crate::received::{Received, Sent, Taken};
@@ -309,6 +310,8 @@ fn take(
     }
     sent.note(run.first..run.end()).map_err(Fault::Wrong)?;
     attempt.came.store(sent.so_far(), Ordering::Relaxed);
+    let (first, worker) = (run.first, &attempt.worker);
+    debug!(task = %attempt.task, worker, first, count, "positions");
     let taken = attempt
         .coming
         .received()

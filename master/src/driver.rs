@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use horma_core::{ExtentRecord, Handout};
 use horma_proto::TaskId;
@@ -24,6 +24,9 @@ use crate::{Config, Progress};
 
 /// Messages that may wait for the driver.
 const INBOX: usize = 256;
+
+/// How often it looks who is silent, who is late, and who has hung up.
+const TICK: Duration = Duration::from_millis(250);
 
 /// The jobs that are going on, and the number of the next one.
 pub(crate) struct Going {
@@ -111,7 +114,7 @@ struct Driver {
 
 impl Driver {
     async fn run(mut self, mut messages: mpsc::Receiver<Message>, shutdown: CancellationToken) {
-        let mut ticks = tokio::time::interval(self.config.heartbeat / 2);
+        let mut ticks = tokio::time::interval(TICK.min(self.config.heartbeat / 2));
         loop {
             // Messages before ticks: a heartbeat that waits must not be taken for silence.
             tokio::select! {

@@ -76,12 +76,10 @@ impl Model {
     fn carry_out(&mut self, call: &Call) {
         let is_open = |job: &u64| self.jobs.get(job).is_some_and(|e| e.stage.is_open());
         match call.clone() {
-            Call::Submit { key, pieces } => {
-                if self.jobs.values().all(|e| e.key != key) {
-                    self.next += 1;
-                    self.jobs.insert(self.next, entry(key));
-                    self.submissions.insert(self.next, pieces);
-                }
+            Call::Submit { key, pieces } if self.jobs.values().all(|e| e.key != key) => {
+                self.next += 1;
+                self.jobs.insert(self.next, entry(key));
+                self.submissions.insert(self.next, pieces);
             }
             Call::Begin { job, digest } if is_open(&job) => {
                 let stage = Stage::Running { parts: 3, digest };
