@@ -469,6 +469,14 @@ pub(crate) struct Master {
         default_value = "127.0.0.1:7171"
     )]
     pub bind: String,
+    /// Address that the rendezvous file tells; without a port, the port that is bound [default: the
+    /// bound address, or this host's name if that is every interface]
+    #[arg(long, value_name = "HOST[:PORT]", env = "HORMA_ADVERTISE")]
+    pub advertise: Option<String>,
+    /// File to write that address into, whole, once it is bound; taken away in the end. Workers find
+    /// the master by it, and again when it comes back elsewhere
+    #[arg(long, value_name = "FILE", env = "HORMA_RENDEZVOUS")]
+    pub rendezvous: Option<PathBuf>,
     /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated
     #[arg(long, conflicts_with = "tls_ca")]
     pub insecure: bool,
@@ -493,8 +501,18 @@ pub(crate) struct Master {
 #[derive(Debug, Args)]
 pub(crate) struct Worker {
     /// Where the master listens
-    #[arg(long, value_name = "HOST:PORT", env = "HORMA_MASTER")]
-    pub master: String,
+    #[arg(
+        long,
+        value_name = "HOST:PORT",
+        env = "HORMA_MASTER",
+        required_unless_present = "rendezvous",
+        conflicts_with = "rendezvous"
+    )]
+    pub master: Option<String>,
+    /// File into which the master writes its address; waited for, and read again whenever the master
+    /// does not answer
+    #[arg(long, value_name = "FILE", env = "HORMA_RENDEZVOUS")]
+    pub rendezvous: Option<PathBuf>,
     /// Where to listen; port 0 takes any free one
     #[arg(
         long,
@@ -503,15 +521,17 @@ pub(crate) struct Worker {
         default_value = "127.0.0.1:0"
     )]
     pub bind: String,
-    /// Address at which others reach this worker [default: the one that leads to the master]
-    #[arg(long, value_name = "HOST:PORT", env = "HORMA_ADVERTISE")]
+    /// Address at which others reach this worker; without a port, the port that is bound [default: the
+    /// one that leads to the master]
+    #[arg(long, value_name = "HOST[:PORT]", env = "HORMA_ADVERTISE")]
     pub advertise: Option<String>,
     /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated
     #[arg(long, conflicts_with = "tls_ca")]
     pub insecure: bool,
     #[command(flatten)]
     pub tls: Tls,
-    /// Name of this worker, the same after a restart [default: host name and process number]
+    /// Name of this worker, the same after a restart [default: its place in the job under Slurm, else
+    /// host name and process number]
     #[arg(long, env = "HORMA_WORKER_ID")]
     pub id: Option<String>,
     /// Threads to digitize with [default: all cores]
@@ -521,7 +541,8 @@ pub(crate) struct Worker {
     /// best there is]
     #[arg(long, value_name = "SET", env = "HORMA_SIMD")]
     pub simd: Option<Simd>,
-    /// How long to look for a master that is not there, or not there any more, seconds
+    /// How long to look for a master that is not there, or not there any more, seconds. To be left by
+    /// a master is the end of the work and exit code 0; never to find one is 4
     #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
     pub patience: u64,
 }

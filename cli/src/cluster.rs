@@ -124,6 +124,7 @@ fn spawn(id: &str, master: &str, threads: usize, simd: Simd) -> Result<Child> {
         .args(["--threads", &threads.to_string()])
         .args(["--simd", &simd.to_string()])
         .env_remove("HORMA_ADVERTISE")
+        .env_remove("HORMA_RENDEZVOUS")
         .env_remove("HORMA_TLS_CA")
         .env_remove("HORMA_TLS_CERT")
         .env_remove("HORMA_TLS_KEY")

@@ -16,6 +16,7 @@ mod verify;
 mod bench;
 mod certs;
 mod inspect;
+mod reach;
 mod serve;
 
 mod progress;

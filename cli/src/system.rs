@@ -52,10 +52,9 @@ fn cpu_of(_process: u32) -> Option<f64> {
     None
 }
 
-/// A name for this process that differs from others' on this and other machines.
-pub(crate) fn process_name() -> String {
-    let host = System::host_name().unwrap_or_else(|_| "host".to_owned());
-    format!("{host}-{}", std::process::id())
+/// This host's name.
+pub(crate) fn host_name() -> String {
+    System::host_name().unwrap_or_else(|_| "localhost".to_owned())
 }
 
 /// A number that differs from one start of a process to the next.
