@@ -34,15 +34,18 @@ enum Fault {
     Corrupt,
     /// A worker's host falls silent: no packet arrives, none is refused; for a while, or for good.
     Blackhole,
+    /// The master is killed, and started again on what it kept.
+    Master,
     /// Two workers' hosts do not reach each other, and everybody else does.
     Partition,
 }
 
-const FAULTS: [Fault; 5] = [
+const FAULTS: [Fault; 6] = [
     Fault::Kill,
     Fault::Stop,
     Fault::Corrupt,
     Fault::Blackhole,
+    Fault::Master,
     Fault::Partition,
 ];
 
@@ -108,7 +111,7 @@ const WORKERS: usize = 3;
 #[test]
 fn faults_by_chance_cost_time_and_never_a_byte() {
     let chosen = std::env::var("HORMA_CHAOS_SEEDS").ok();
-    let seeds: Range<u64> = chosen.map_or(0..10, |seeds| {
+    let seeds: Range<u64> = chosen.map_or(0..12, |seeds| {
         let (from, to) = seeds
             .split_once("..")
             .expect("HORMA_CHAOS_SEEDS is FROM..TO");
@@ -184,13 +187,24 @@ fn run(plan: &Plan, lab: Option<&Lab>, job: &Path, out: &Path) {
     let mut insecure = vec!["--insecure"];
     insecure.retain(|_| lab.is_some());
 
-    let mut args = vec!["master", "--lease", "1", "--bind"];
-    let bind = any(0);
-    args.push(&bind);
-    args.extend(&insecure);
-    let mut master = on(0, "master", "info", &args);
-    let line = master.wait_for(&["listening on"]);
-    let address = line.rsplit(' ').next().expect("a word").to_owned();
+    let store = out.with_extension("store");
+    let start = |bind: &str| {
+        let mut args = vec![
+            "master",
+            "--lease",
+            "1",
+            "--bind",
+            bind,
+            "--store",
+            text(&store),
+        ];
+        args.extend(&insecure);
+        let mut master = on(0, "master", "info", &args);
+        let line = master.wait_for(&["listening on"]);
+        let address = line.rsplit(' ').next().expect("a word").to_owned();
+        (master, address)
+    };
+    let (mut master, address) = start(&any(0));
 
     let proxy = (plan.fault == Fault::Corrupt).then(|| Proxy::new(plan.bit, plan.from_worker));
     let mut workers = Vec::new();
@@ -261,6 +275,12 @@ fn run(plan: &Plan, lab: Option<&Lab>, job: &Path, out: &Path) {
             workers[plan.victim].signal("-CONT");
         }
         Fault::Corrupt => {}
+        Fault::Master => {
+            assert!(!client.has_ended(), "the job goes on");
+            master.child.kill().expect("alive");
+            assert!(!master.child.wait().expect("its end").success());
+            master = start(&address).0;
+        }
         Fault::Blackhole => {
             lab.expect("hosts").cut_off(plan.victim + 1, None);
             assert!(!client.has_ended(), "the job goes on");
@@ -282,6 +302,7 @@ fn run(plan: &Plan, lab: Option<&Lab>, job: &Path, out: &Path) {
     let (code, log) = client.end();
     assert_eq!(code, Some(0), "{log}");
     assert!(dropped != Some(0), "no packet was lost");
+    assert!(!master.has_ended(), "the master serves on");
     if let Some(proxy) = proxy {
         assert!(
             proxy.has_flipped(),

@@ -335,7 +335,7 @@ async fn submit_raw(address: &str, key: u8) -> Result<u64, Status> {
     };
     let bodies = std::iter::once(horma_proto::body_to_wire(&body));
     let bodies = horma_proto::Chunks::of(bodies).map(Kind::Bodies);
-    let kinds = std::iter::once(Kind::Header(header)).chain(bodies);
+    let kinds = std::iter::once(Kind::Header(horma_proto::seal(&header))).chain(bodies);
     let requests: Vec<_> = kinds
         .map(|kind| SubmitRequest { kind: Some(kind) })
         .collect();

@@ -7,7 +7,7 @@ use horma_master::{Outcome, Progress};
 use horma_proto::wire::path_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
 use horma_proto::wire::{
-    CancelRequest, DiscardRequest, PathReply, PathRequest, SubmitHeader, SubmitRequest,
+    CancelRequest, DiscardRequest, PathHeader, PathReply, PathRequest, SubmitHeader, SubmitRequest,
 };
 use horma_proto::{Chunks, VERSION};
 use tokio::time::Instant;
@@ -32,7 +32,7 @@ pub(crate) async fn send(
         name: name.to_owned(),
     };
     let sending = remote.call(async |mut client, _| {
-        let requests = requests(header.clone(), part.clone());
+        let requests = requests(&header, part.clone());
         let reply = client.submit(tokio_stream::iter(requests)).await?;
         Ok(reply.into_inner().job)
     });
@@ -85,8 +85,9 @@ async fn receive(
             Some(Reply::Progress(p)) => progress(phase(&p.phase), p.done, p.total),
             Some(Reply::Path(header)) => {
                 progress("receive", 0, 0);
-                let header = horma_proto::trajectory_from_wire(header.trajectory.as_ref());
-                trajectory = Some(header.map_err(|e| bad(&e))?);
+                let header: PathHeader = horma_proto::open(&header).map_err(|e| bad(&e))?;
+                let found = horma_proto::trajectory_from_wire(header.trajectory.as_ref());
+                trajectory = Some(found.map_err(|e| bad(&e))?);
             }
             Some(Reply::Positions(positions)) => {
                 let count = trajectory.map_or(0, |t| t.positions);
@@ -107,12 +108,13 @@ async fn receive(
 
 /// The job and its part, packed as they are sent.
 fn requests(
-    header: SubmitHeader,
+    header: &SubmitHeader,
     part: Part,
 ) -> impl Iterator<Item = SubmitRequest> + Send + 'static {
     let bodies = part.bodies.into_iter();
     let bodies = Chunks::of(bodies.map(|b| horma_proto::body_to_wire(&b)));
-    let kinds = std::iter::once(Request::Header(header)).chain(bodies.map(Request::Bodies));
+    let kinds = std::iter::once(Request::Header(horma_proto::seal(header)))
+        .chain(bodies.map(Request::Bodies));
     kinds.map(|kind| SubmitRequest { kind: Some(kind) })
 }
 

@@ -16,7 +16,7 @@ pub(crate) fn to_pieces((path, record): &Outcome) -> Result<Pieces> {
     };
     let positions = horma_proto::position_chunks(0, &path.touches, &path.between);
     let record = serde_json::to_vec(record).map_err(|e| Error::StoreDamaged(e.to_string()))?;
-    let kinds = std::iter::once(Kind::Path(header))
+    let kinds = std::iter::once(Kind::Path(horma_proto::seal(&header)))
         .chain(positions.map(Kind::Positions))
         .chain(std::iter::once(Kind::Record(record.into())));
     let piece = |kind| wire::PathReply { kind: Some(kind) }.encode_to_vec();

@@ -1,10 +1,8 @@
 //! A submission: a job and its part as a client sends them, checked piece by piece as they come, and
 //! again when they come back from the store.
 
-use bytes::Bytes;
 use horma_core::{Distribution, Job, Part};
 use horma_proto::{Error, Messages, Result, VERSION, wire};
-use prost::Message;
 
 use crate::store::Pieces;
 
@@ -43,10 +41,11 @@ pub(crate) struct Submission {
 
 impl Arriving {
     /// Takes the header, which comes first and once; returns its key.
-    pub fn header(&mut self, header: &wire::SubmitHeader) -> Result<u128> {
+    pub fn header(&mut self, sealed: &wire::Chunk) -> Result<u128> {
         if self.header.is_some() {
             return Err(out_of_order());
         }
+        let header: wire::SubmitHeader = horma_proto::open(sealed)?;
         check_version(&header.version)?;
         let key = header.key[..].try_into().map(u128::from_le_bytes);
         let job = header.job.as_ref().ok_or(missing("a job"))?;
@@ -58,11 +57,11 @@ impl Arriving {
         }
         let all = Header {
             key: key.map_err(|_| missing("a key of 16 bytes"))?,
-            name: header.name.clone(),
             job: horma_proto::job_from_wire(job)?,
             distribution: horma_proto::distribution_from_wire(header.distribution())?,
+            name: header.name,
         };
-        self.pieces.push(header.encode_to_vec().into());
+        self.pieces.push(sealed.data.clone());
         Ok(self.header.insert(all).key)
     }
 
@@ -101,17 +100,11 @@ pub(crate) fn again(pieces: Pieces) -> Result<Submission> {
     let mut arriving = Arriving::default();
     let mut pieces = pieces.into_iter();
     let header = pieces.next().ok_or(missing("a header"))?;
-    let header = wire::SubmitHeader::decode(header);
-    arriving.header(&header.map_err(|e| Error::Malformed(e.to_string()))?)?;
+    arriving.header(&horma_proto::chunk(header))?;
     for data in pieces {
-        arriving.bodies(&chunk(data))?;
+        arriving.bodies(&horma_proto::chunk(data))?;
     }
     arriving.end()
-}
-
-fn chunk(data: Bytes) -> wire::Chunk {
-    let crc32c = crc32c::crc32c(&data);
-    wire::Chunk { data, crc32c }
 }
 
 /// Both ends run the same version.

@@ -64,7 +64,8 @@ pub fn open<M: Message + Default>(chunk: &wire::Chunk) -> Result<M> {
     M::decode(data.clone()).map_err(|e| Error::Malformed(e.to_string()))
 }
 
-fn chunk(data: Bytes) -> wire::Chunk {
+/// Bytes and their checksum.
+pub fn chunk(data: Bytes) -> wire::Chunk {
     wire::Chunk {
         crc32c: crc32c::crc32c(&data),
         data,
@@ -331,7 +332,7 @@ mod tests {
         };
         let flips: [&dyn Fn(&mut wire::Positions); 3] =
             [&|p| p.first ^= 1, &|p| flip(&mut p.touches), &|p| {
-                flip(&mut p.between)
+                flip(&mut p.between);
             }];
         for flip in flips {
             let mut bad = good.clone();

@@ -23,7 +23,7 @@ pub mod wire {
     tonic::include_proto!("horma.cluster.v1");
 }
 
-pub use chunk::{CHUNK_BYTES, Chunks, Messages, open, seal};
+pub use chunk::{CHUNK_BYTES, Chunks, Messages, chunk, open, seal};
 pub use chunk::{checksum, pack_positions, position_chunks, unpack_positions};
 pub use convert::{body_from_wire, body_to_wire, job_from_wire, job_to_wire};
 pub use convert::{counters_from_wire, counters_to_wire};
