@@ -33,13 +33,15 @@ fn files(dir: &Path) -> Vec<PathBuf> {
 fn commands(text: &str) -> Vec<Vec<String>> {
     let text = text.replace("\\\n", " ");
     let lines = text.lines().map(str::trim);
-    let code = lines.filter(|l| !l.starts_with('#') && !l.starts_with("- "));
+    let code = lines.filter(|l| !l.starts_with('#') && !l.starts_with("Description="));
     let mut found = Vec::new();
     for line in code {
         let words: Vec<&str> = line.split_whitespace().collect();
         let command = |w: &&str| w.rsplit(['/', '=', '(']).next() == Some("horma");
         let starts = words.iter().position(command);
-        let Some(start) = starts.filter(|&s| s + 1 < words.len()) else {
+        // Elsewhere it is a file or an image.
+        let begins = |s: &usize| *s == 0 || words[0] == "srun";
+        let Some(start) = starts.filter(begins).filter(|&s| s + 1 < words.len()) else {
             continue;
         };
         let ends =
@@ -86,11 +88,19 @@ fn every_command_of_scripts_units_and_pages_parses() {
         if file.extension().is_some_and(|e| e == "yaml") || file.ends_with("Dockerfile") {
             continue;
         }
-        for command in commands(&text) {
+        // Of a page, what is to be typed.
+        let typed = if file.extension().is_some_and(|e| e == "md") {
+            let fenced = text.split("```").skip(1).step_by(2);
+            fenced.collect::<String>()
+        } else {
+            text
+        };
+        for command in commands(&typed) {
             // With --help at its end a command is read from left to right and not carried out. What
             // the shell puts in is not known here: whatever it is, it is one word.
-            let mut args: Vec<&str> = command.iter().map(String::as_str).collect();
-            args.retain(|a| !a.contains("[@]}"));
+            let words = command.iter().filter(|w| !w.contains("[@]}"));
+            let known = |w| if str::contains(w, '$') { "1" } else { w };
+            let mut args: Vec<&str> = words.map(|w| known(w)).collect();
             args.push("--help");
             let output = common::run(&args);
             assert!(
