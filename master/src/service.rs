@@ -8,8 +8,8 @@ use horma_proto::wire::path_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
 use horma_proto::wire::{
     self, CancelReply, CancelRequest, DialBackReply, DialBackRequest, DiscardReply, DiscardRequest,
-    HeartbeatReply, HeartbeatRequest, PathReply, PathRequest, RegisterReply, RegisterRequest,
-    StatusReply, StatusRequest, SubmitReply, SubmitRequest,
+    HeartbeatReply, HeartbeatRequest, LeaveReply, LeaveRequest, PathReply, PathRequest,
+    RegisterReply, RegisterRequest, StatusReply, StatusRequest, SubmitReply, SubmitRequest,
 };
 use horma_proto::{Error, Guard, Role, Tls, VERSION, transport};
 use tokio::sync::{mpsc, oneshot};
@@ -139,6 +139,21 @@ impl Api for Service {
             unix_ms: since.map_or(0, |t| t.as_millis() as u64),
             trouble,
         }))
+    }
+
+    async fn leave(&self, call: Call<LeaveRequest>) -> Result<Response<LeaveReply>, Status> {
+        self.guard.admit(&call, Role::Worker)?;
+        let LeaveRequest {
+            worker,
+            incarnation,
+        } = call.into_inner();
+        let leave = |reply| Message::Leave {
+            worker,
+            incarnation,
+            reply,
+        };
+        self.ask(leave).await?;
+        Ok(Response::new(LeaveReply {}))
     }
 
     async fn submit(
