@@ -104,7 +104,7 @@ async fn unless_again(ending: impl Future<Output = Result<()>>) -> Result<()> {
 }
 
 /// One of the two is given: parsing sees to it.
-fn rendezvous(file: Option<PathBuf>, address: Option<String>) -> Rendezvous {
+pub(crate) fn rendezvous(file: Option<PathBuf>, address: Option<String>) -> Rendezvous {
     file.map_or_else(
         || Rendezvous::Address(address.unwrap_or_default()),
         Rendezvous::File,
@@ -123,9 +123,15 @@ fn serve(server: impl Future<Output = Result<()>>) -> Result<()> {
     served
 }
 
-/// Listens, and prints where: with port 0 nobody could know otherwise. Beyond this machine only if
-/// what comes from there can be trusted.
+/// Listens, and prints where: with port 0 nobody could know otherwise.
 async fn listen(address: &str, trusted: bool) -> Result<(TcpListener, SocketAddr)> {
+    let (listener, bound) = bind_as(address, trusted).await?;
+    say(&format!("listening on {bound}"));
+    Ok((listener, bound))
+}
+
+/// Listens; beyond this machine only if what comes from there can be trusted.
+pub(crate) async fn bind_as(address: &str, trusted: bool) -> Result<(TcpListener, SocketAddr)> {
     let listener = bind(address).await?;
     let bound = listener.local_addr().map_err(|source| Error::Bind {
         address: address.to_owned(),
@@ -136,7 +142,6 @@ async fn listen(address: &str, trusted: bool) -> Result<(TcpListener, SocketAddr
             address: bound.to_string(),
         });
     }
-    say(&format!("listening on {bound}"));
     Ok((listener, bound))
 }
 
