@@ -321,8 +321,11 @@ impl Desk {
             }
             Err(error) => Err(error),
         };
-        let Err(error) = kept else {
-            return Ok(());
+        let error = match kept {
+            Ok(()) => return Ok(()),
+            // It is not over: the next start goes on with it.
+            Err(Error::Interrupted) if self.shutdown.is_cancelled() => return Ok(()),
+            Err(error) => error,
         };
         warn!(job, %error, "failed");
         let stage = failed(error);
