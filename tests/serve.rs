@@ -240,6 +240,26 @@ fn a_worker_whose_master_goes_for_good_in_the_middle_of_a_job_says_so() {
 }
 
 #[test]
+fn a_small_job_is_done_in_the_middle_of_a_big_one() {
+    let dir = scratch();
+    let (long, short) = (long_job(dir.path()), short_job(dir.path()));
+    let alone = path_of(&short, dir.path(), "alone", &[]);
+    let (_master, address) = master(&[]);
+    let mut worker = worker(&address, "w");
+    let others = ["a", "b", "c", "d", "e"].map(|id| common::worker(&address, id));
+    let big = detach(&long, &address, &[]);
+    worker.wait_for(&["positions", "first="]);
+    // The worker has all of the big job's extents before it.
+    for other in others {
+        terminated(other);
+    }
+    let small = detach(&short, &address, &[]);
+    assert!(fetched(&address, &small, &dir.path().join("out")) == alone);
+    assert_eq!(status(&address, &big)["stage"], "running", "far from done");
+    succeed(&["cancel", &big, "--master", &address]);
+}
+
+#[test]
 fn queued_jobs_are_there_when_the_master_is_killed() {
     let dir = scratch();
     let job = short_job(dir.path());
