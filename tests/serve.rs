@@ -246,13 +246,12 @@ fn a_small_job_is_done_in_the_middle_of_a_big_one() {
     let alone = path_of(&short, dir.path(), "alone", &[]);
     let (_master, address) = master(&[]);
     let mut worker = worker(&address, "w");
+    // These make it several extents, and do none of them.
     let others = ["a", "b", "c", "d", "e"].map(|id| common::worker(&address, id));
-    let big = detach(&long, &address, &[]);
+    others.iter().for_each(|other| other.signal("-STOP"));
+    let big = detach(&long, &address, &["--points-per-revolution", "900"]);
     worker.wait_for(&["positions", "first="]);
-    // The worker has all of the big job's extents before it.
-    for other in others {
-        terminated(other);
-    }
+    drop(others);
     let small = detach(&short, &address, &[]);
     assert!(fetched(&address, &small, &dir.path().join("out")) == alone);
     assert_eq!(status(&address, &big)["stage"], "running", "far from done");
