@@ -10,12 +10,13 @@ use super::model::{Fit, Projection};
 use super::runs::Run;
 use super::summary::{self, PHASES, Summary};
 
-/// All tables.
+/// All tables, and the diagrams by file and title.
 pub(super) fn markdown(
     experiment: &Experiment,
     summaries: &[Summary],
     fits: &[Fit],
     projections: &[Projection],
+    diagrams: &[(&str, &str)],
 ) -> String {
     let network = experiment.network;
     let sections = [
@@ -56,6 +57,7 @@ pub(super) fn markdown(
             ),
             &projected(projections),
         ),
+        pictures(diagrams),
     ];
     sections.join("\n\n") + "\n"
 }
@@ -73,11 +75,18 @@ fn heading(experiment: &Experiment, summaries: &[Summary]) -> String {
         String::new()
     };
     format!(
-        "# Scaling\n\nhorma {VERSION}: {}. {cores} cores; load in the minute before: {:.1}. Rounds: \
+        "# Scaling\n\n```sh\n{}\n```\n\nhorma {VERSION}: {}. {cores} cores; load in the minute before: {:.1}. Rounds: \
          {rounds}, in each of which every case took its turn, a thread to each worker, and gave the path \
          of one process to the last bit.{few}",
-        experiment.subject, experiment.load
+        experiment.command, experiment.subject, experiment.load
     )
+}
+
+fn pictures(diagrams: &[(&str, &str)]) -> String {
+    let lines = diagrams
+        .iter()
+        .map(|(file, title)| format!("![{title}]({file})"));
+    format!("## Diagrams\n\n{}", lines.collect::<Vec<_>>().join("\n\n"))
 }
 
 fn section(title: &str, note: &str, table: &[Vec<String>]) -> String {
