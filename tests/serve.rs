@@ -217,6 +217,29 @@ fn what_takes_too_long_is_left_to_the_store_and_a_second_signal_waits_for_nothin
 }
 
 #[test]
+fn a_worker_whose_master_goes_for_good_in_the_middle_of_a_job_says_so() {
+    let dir = scratch();
+    let (first, address) = master(&["--lease", "1"]);
+    let args = [
+        "worker",
+        "--master",
+        &address,
+        "--id",
+        "w",
+        "--threads",
+        "1",
+    ];
+    let mut worker = Process::start("w", &[&args[..], &["--patience", "1"]].concat(), "debug");
+    worker.wait_for(&["registered"]);
+    detach(&long_job(dir.path()), &address, &[]);
+    worker.wait_for(&["going on", "jobs=[1]"]);
+    drop(first);
+    let (code, log) = worker.end();
+    assert_eq!(code, Some(4), "{log}");
+    assert!(log.contains("1 of its jobs were under way"), "{log}");
+}
+
+#[test]
 fn queued_jobs_are_there_when_the_master_is_killed() {
     let dir = scratch();
     let job = short_job(dir.path());
