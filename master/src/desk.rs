@@ -26,6 +26,9 @@ use crate::store::{Entry, Gone, Stage, Store};
 use crate::submission::{self, Submission};
 use crate::{Limits, Master, Progress, result};
 
+/// What a client is told.
+type Answer<T> = std::result::Result<T, Refusal>;
+
 /// How often is looked for results that are too old.
 const EXPIRY: Duration = Duration::from_secs(10);
 
@@ -118,7 +121,7 @@ impl Desk {
     }
 
     /// A client's call, for as long as this is held.
-    pub fn call(&self) -> std::result::Result<OwnedSemaphorePermit, Refusal> {
+    pub fn call(&self) -> Answer<OwnedSemaphorePermit> {
         let call = self.calls.clone().try_acquire_owned();
         call.map_err(|_| {
             let limit = self.limits.calls;
@@ -129,7 +132,7 @@ impl Desk {
     }
 
     /// Waits until a part may come in: each is in memory until it is in the store.
-    pub async fn part(&self) -> std::result::Result<SemaphorePermit<'_>, Refusal> {
+    pub async fn part(&self) -> Answer<SemaphorePermit<'_>> {
         let part = self.parts.acquire().await;
         part.map_err(|_| Refusal::ShuttingDown("the master"))
     }
@@ -143,7 +146,7 @@ impl Desk {
     }
 
     /// A place for one more job.
-    pub fn place(&self) -> std::result::Result<OwnedSemaphorePermit, Refusal> {
+    pub fn place(&self) -> Answer<OwnedSemaphorePermit> {
         if self.master.draining.is_cancelled() {
             return Err(Refusal::ShuttingDown("the master"));
         }
@@ -161,18 +164,14 @@ impl Desk {
         self: &Arc<Self>,
         submission: Submission,
         place: OwnedSemaphorePermit,
-    ) -> std::result::Result<u64, Refusal> {
+    ) -> Answer<u64> {
         let desk = self.clone();
         let taking = spawn_blocking(move || desk.take_in(submission, place));
         let stopping = |_| Refusal::ShuttingDown("the master");
         taking.await.map_err(stopping)?
     }
 
-    fn take_in(
-        &self,
-        submission: Submission,
-        place: OwnedSemaphorePermit,
-    ) -> std::result::Result<u64, Refusal> {
+    fn take_in(&self, submission: Submission, place: OwnedSemaphorePermit) -> Answer<u64> {
         let Submission {
             key,
             name,
@@ -209,14 +208,14 @@ impl Desk {
     }
 
     /// A job as it goes on.
-    pub fn watch(&self, job: u64) -> std::result::Result<watch::Receiver<View>, Refusal> {
+    pub fn watch(&self, job: u64) -> Answer<watch::Receiver<View>> {
         let jobs = self.lock();
         let known = jobs.get(&job).ok_or_else(|| unknown(job))?;
         Ok(known.view.subscribe())
     }
 
     /// Ends a job, unless it is over.
-    pub async fn cancel(self: &Arc<Self>, job: u64) -> std::result::Result<(), Refusal> {
+    pub async fn cancel(self: &Arc<Self>, job: u64) -> Answer<()> {
         drop(self.watch(job)?);
         let end = move |store: &Store| store.end(job, Stage::Cancelled { at: now() });
         self.change(job, end).await.map_err(Refusal::from)
@@ -230,7 +229,7 @@ impl Desk {
     }
 
     /// Drops a result that the client has.
-    pub async fn discard(self: &Arc<Self>, job: u64) -> std::result::Result<(), Refusal> {
+    pub async fn discard(self: &Arc<Self>, job: u64) -> Answer<()> {
         drop(self.watch(job)?);
         let discard = move |store: &Store| store.drop_result(job, Gone::Fetched);
         self.change(job, discard).await.map_err(Refusal::from)
@@ -261,7 +260,9 @@ impl Desk {
             known.place = None;
         }
         known.view.send_if_modified(|view| {
-            let changed = view.entry.stage != stage;
+            // What is over stays so, whoever is late to say that it goes on.
+            let over = stage.is_open() && !view.entry.stage.is_open();
+            let changed = !over && view.entry.stage != stage;
             if changed {
                 info!(job, ?stage, "job");
                 view.entry.stage = stage;
