@@ -31,6 +31,8 @@ struct Experiment {
     command: String,
     /// Part, cutter, motion and grid in words.
     subject: String,
+    /// What brute force does of it, if it is asked for.
+    thinned: String,
     /// Rows that any extent needs, the papers' n.
     rows: u64,
     /// Cores that this process may use.
@@ -76,12 +78,12 @@ fn measure_and_write(args: &BenchScaling, display: &Display) -> Result<String> {
     let experiment = Experiment {
         command: format!("horma {}", typed.join(" ")),
         subject: format!(
-            "{name}, {points} points, {}, step {} mm, {} points a revolution{}",
+            "{name}, {points} points, {}, step {} mm, {} points a revolution",
             super::figures::described(&file.job.cutter),
             file.job.motion.step,
             file.job.motion.points_per_revolution,
-            thinned(args, &file.job),
         ),
+        thinned: thinned(args, &file.job),
         rows: runs
             .iter()
             .filter_map(|r| r.record.traffic)

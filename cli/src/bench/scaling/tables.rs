@@ -26,7 +26,9 @@ pub(super) fn markdown(
             "Wall time from the start of the processes to the path, s: median, and range. CPU in s. The \
              critical path is the CPU time of the master and of the busiest worker. Speed-up and \
              efficiency are against one process, by wall time and by critical path. Imbalance: how \
-             much more CPU time than the average the busiest worker took.",
+             much more CPU time than the average the busiest worker took. By brute force a position looks at \
+             all rows that its extent has, and at fewer the more extents there are: so it gains more \
+             than the number of workers.",
             &times(summaries),
         ),
         section(
@@ -75,10 +77,10 @@ fn heading(experiment: &Experiment, summaries: &[Summary]) -> String {
         String::new()
     };
     format!(
-        "# Scaling\n\n```sh\n{}\n```\n\nhorma {VERSION}: {}. {cores} cores; load in the minute before: {:.1}. Rounds: \
+        "# Scaling\n\n```sh\n{}\n```\n\nhorma {VERSION}: {}{}. {cores} cores; load in the minute before: {:.1}. Rounds: \
          {rounds}, in each of which every case took its turn, a thread to each worker, and gave the path \
          of one process to the last bit.{few}",
-        experiment.command, experiment.subject, experiment.load
+        experiment.command, experiment.subject, experiment.thinned, experiment.load
     )
 }
 
