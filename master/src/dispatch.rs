@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use horma_core::{Extent, ExtentRecord, Handout, Run, Stock, SubTrajectory};
+use horma_proto::metrics::{POSITIONS, TRAFFIC};
 use horma_proto::transport::{self, Trouble};
 use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::digitize_request::Kind as Request;
@@ -167,7 +168,9 @@ fn requests(
     let requests = std::iter::once(Request::Task(task)).chain(chunks.map(Request::Rows));
     tokio_stream::iter(requests.map(move |kind| {
         let request = DigitizeRequest { kind: Some(kind) };
-        sent.fetch_add(request.encoded_len() as u64, Ordering::Relaxed);
+        let bytes = request.encoded_len() as u64;
+        sent.fetch_add(bytes, Ordering::Relaxed);
+        TRAFFIC.add("to_workers", bytes);
         request
     }))
 }
@@ -231,7 +234,9 @@ async fn receive(
     let total = attempt.plan.trajectory.positions;
     let mut bytes = 0;
     while let Some(reply) = replies.message().await.map_err(|s| fault(&s))? {
-        bytes += reply.encoded_len() as u64;
+        let reply_bytes = reply.encoded_len() as u64;
+        bytes += reply_bytes;
+        TRAFFIC.add("results", reply_bytes);
         let id: TaskId = reply.id.try_into().map_err(wrong)?;
         if id != attempt.task {
             return Err(Fault::Wrong(format!("it speaks of {id}")));
@@ -250,6 +255,7 @@ async fn receive(
                 let all = attempt.inserted.fetch_add(inserted, Ordering::Relaxed) + inserted;
                 let fits = attempt.plan.check_inserted(all);
                 fits.map_err(|e| Fault::Lost(e.to_string()))?;
+                POSITIONS.add("", count);
                 let arrived = attempt.arrived.fetch_add(count, Ordering::Relaxed) + count;
                 (attempt.progress)("digitize", arrived, total);
             }

@@ -12,6 +12,7 @@ mod span;
 mod task;
 
 mod accept;
+pub mod metrics;
 mod refused;
 pub mod tls;
 pub mod transport;

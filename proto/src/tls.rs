@@ -156,6 +156,13 @@ impl Tls {
         })
     }
 
+    /// Takes in connections of another protocol than gRPC's.
+    pub(crate) fn acceptor_of(&self, protocol: &[u8]) -> TlsAcceptor {
+        let mut server = ServerConfig::clone(self.acceptor.config());
+        server.alpn_protocols = vec![protocol.to_vec()];
+        TlsAcceptor::from(Arc::new(server))
+    }
+
     /// Whether others will take this process for one of that role: a server has to know, since nobody
     /// else would tell it.
     ///

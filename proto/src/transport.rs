@@ -13,6 +13,8 @@ use tokio_rustls::TlsConnector;
 use tokio_rustls::client::TlsStream;
 use tokio_rustls::rustls::pki_types::ServerName;
 use tokio_rustls::rustls::{self, AlertDescription, CertificateError};
+use tokio_rustls::server::TlsStream as Accepted;
+use tokio_stream::wrappers::ReceiverStream;
 use tonic::body::Body;
 use tonic::codegen::http::{Request, Response, Uri};
 use tonic::server::NamedService;
@@ -143,6 +145,18 @@ where
     };
     refused.tell();
     served
+}
+
+/// A connection with TLS that somebody else made.
+pub type SecuredStream = Accepted<TcpStream>;
+
+/// Such connections, until this is dropped.
+pub type Secured = ReceiverStream<io::Result<SecuredStream>>;
+
+/// Connections of HTTP/1.1, from whoever proves to have a certificate, of any role.
+pub fn secured_http(listener: TcpListener, tls: &Tls) -> Secured {
+    let refused = Arc::new(Refused::default());
+    accept::secured(listener, tls.acceptor_of(b"http/1.1"), refused)
 }
 
 /// What may help where a plain connection broke before anything was heard.

@@ -25,6 +25,7 @@ use horma_core::Simd;
 use horma_proto::wire::worker_server::WorkerServer;
 use horma_proto::{Guard, MAX_MESSAGE, Tls, transport};
 use tokio::net::TcpListener;
+use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 use tracing::info;
 
@@ -55,12 +56,18 @@ pub struct Config {
 /// How long open tasks may take to notice a shutdown.
 const DRAIN: Duration = Duration::from_secs(5);
 
-/// Serves on `listener` until `shutdown`, or until the master has been gone for too long.
+/// Serves on `listener` until `shutdown`, or until the master has been gone for too long. Whether it is
+/// a member of the master is told to `registered` as it changes.
 ///
 /// # Errors
 /// [`Error::NoMaster`] if the master never answered, [`Error::Refused`] if it did not want this
 /// worker, and errors of the operating system.
-pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationToken) -> Result<()> {
+pub async fn run(
+    listener: TcpListener,
+    config: Config,
+    registered: watch::Sender<bool>,
+    shutdown: CancellationToken,
+) -> Result<()> {
     let bound = listener.local_addr().map_err(Error::Listener)?;
     let address = match &config.advertise {
         Some(address) => address.clone(),
@@ -88,7 +95,7 @@ pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationTo
         tokio::spawn(
             async move { transport::serve(service, listener, tls.as_ref(), stopped).await },
         );
-    let outcome = membership::keep(&config, &address, &store, &shutdown).await;
+    let outcome = membership::keep(&config, &address, &store, &registered, &shutdown).await;
     // Membership is what a worker lives for: without it there is nobody to serve.
     shutdown.cancel();
     // A task that does not notice is abandoned: the master gives its extent to another.

@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
+use horma_proto::metrics::REGISTERED;
 use horma_proto::transport::{self, Trouble, WANTS_TLS};
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::{HeartbeatRequest, RegisterRequest};
 use horma_proto::{Answer, Role, VERSION};
+use tokio::sync::watch;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
@@ -29,6 +31,7 @@ pub(crate) async fn keep(
     config: &Config,
     address: &str,
     store: &Store,
+    registered: &watch::Sender<bool>,
     shutdown: &CancellationToken,
 ) -> Result<()> {
     let member = async {
@@ -42,7 +45,9 @@ pub(crate) async fn keep(
                     info!(master = config.master, "registered");
                     store.keep_master(master);
                     pause = FIRST_PAUSE;
+                    member(registered, true);
                     let silence = heartbeats(&mut client, config, store, interval).await;
+                    member(registered, false);
                     heard = Some(Instant::now());
                     silence
                 }
@@ -83,6 +88,12 @@ pub(crate) async fn keep(
         outcome = member => outcome,
         () = shutdown.cancelled() => Ok(()),
     }
+}
+
+/// Tells those who watch whether this worker is a member.
+fn member(registered: &watch::Sender<bool>, is: bool) {
+    registered.send_replace(is);
+    REGISTERED.set("", f64::from(u8::from(is)));
 }
 
 fn connect(config: &Config) -> Result<MasterClient<Channel>> {
