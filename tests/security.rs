@@ -2,6 +2,8 @@
 //! right role is turned away and told why.
 
 mod common;
+#[path = "security/http.rs"]
+mod http;
 
 use std::path::{Path, PathBuf};
 

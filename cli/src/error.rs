@@ -90,6 +90,8 @@ pub(crate) enum Error {
         "without its fallback, or without delta_u and delta_v, the local search goes over the whole path in one process; use `horma run` without workers"
     )]
     OneProcess,
+    #[error("cannot count what goes on: {0}")]
+    Metrics(String),
     #[error("cannot start threads: {0}")]
     Threads(String),
     #[error("interrupted")]
@@ -131,6 +133,7 @@ impl Error {
             | Self::JobFailed { .. }
             | Self::BadReply { .. }
             | Self::Certs(_)
+            | Self::Metrics(_)
             | Self::Threads(_) => 4,
             Self::Interrupted => 130,
         }

@@ -15,6 +15,7 @@ mod verify;
 
 mod bench;
 mod certs;
+mod http;
 mod inspect;
 mod serve;
 

@@ -7,11 +7,13 @@ use horma_master::Config;
 use horma_proto::Role;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
+use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
 use crate::args::{Master, Worker};
 use crate::cluster::bind;
 use crate::error::{Error, Result};
+use crate::http::{self, Watched};
 use crate::{say, system, tls};
 
 /// How long threads may take to notice that the process ends.
@@ -33,8 +35,14 @@ pub(crate) fn master(args: &Master) -> Result<()> {
     };
     serve(async {
         let listener = listen(&args.bind, trusted).await?;
+        let http = http::listen(args.http.as_deref(), Role::Master, trusted).await?;
+        let tls = config.tls.clone();
         let shutdown = CancellationToken::new();
-        let (_master, serving) = horma_master::start(listener, config, shutdown.clone());
+        let (master, serving) = horma_master::start(listener, config, shutdown.clone());
+        if let Some(http) = http {
+            let (watched, shutdown) = (Watched::Master(master), shutdown.clone());
+            tokio::spawn(async move { http::serve(http, tls.as_ref(), watched, shutdown).await });
+        }
         let mut serving = std::pin::pin!(serving);
         tokio::select! {
             served = &mut serving => return served.map_or(Ok(()), |s| Ok(s?)),
@@ -60,13 +68,20 @@ pub(crate) fn worker(args: Worker) -> Result<()> {
     };
     serve(async {
         let listener = listen(&args.bind, trusted).await?;
+        let http = http::listen(args.http.as_deref(), Role::Worker, trusted).await?;
+        let tls = config.tls.clone();
         let shutdown = CancellationToken::new();
+        let (registered, watched) = watch::channel(false);
+        if let Some(http) = http {
+            let (watched, shutdown) = (Watched::Worker(watched), shutdown.clone());
+            tokio::spawn(async move { http::serve(http, tls.as_ref(), watched, shutdown).await });
+        }
         let stopping = shutdown.clone();
         tokio::spawn(async move {
             system::interrupted().await;
             stopping.cancel();
         });
-        Ok(horma_worker::run(listener, config, shutdown).await?)
+        Ok(horma_worker::run(listener, config, registered, shutdown).await?)
     })
 }
 
@@ -78,19 +93,9 @@ fn serve(server: impl Future<Output = Result<()>>) -> Result<()> {
     served
 }
 
-/// Listens, and prints where: with port 0 nobody could know otherwise. Beyond this machine only if
-/// what comes from there can be trusted.
+/// Listens, and prints where: with port 0 nobody could know otherwise.
 async fn listen(address: &str, trusted: bool) -> Result<TcpListener> {
-    let listener = bind(address).await?;
-    let bound = listener.local_addr().map_err(|source| Error::Bind {
-        address: address.to_owned(),
-        source,
-    })?;
-    if !bound.ip().is_loopback() && !trusted {
-        return Err(Error::Exposed {
-            address: bound.to_string(),
-        });
-    }
+    let (listener, bound) = bind(address, trusted).await?;
     say(&format!("listening on {bound}"));
     Ok(listener)
 }

@@ -10,14 +10,17 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use horma_core::{Distribution, Handout, Job, Part, Phase, Record, SubTrajectory, stitch};
 use horma_proto::TaskId;
+use horma_proto::metrics::JOB_SECONDS;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
 use crate::dispatch::{Delivery, Undelivered, dispatch};
 use crate::error::{Error, Result};
+use crate::history::{Happening, History};
 use crate::place::{Placed, place};
 use crate::running::RunningJob;
+use crate::snapshot::{self, JobState, Snapshot, snapshot};
 use crate::state::{Command, Event, Fault, Held, State, Step, apply};
 use crate::{Config, Outcome, Progress};
 
@@ -55,6 +58,11 @@ pub(crate) enum Message {
         /// What is going on, if it is known.
         reply: oneshot::Sender<Option<Going>>,
     },
+    /// Somebody wants to see what goes on, and what has happened since.
+    Look {
+        since: u64,
+        reply: oneshot::Sender<(Snapshot, Vec<Happening>)>,
+    },
     Run {
         plan: Arc<Handout>,
         parts: u32,
@@ -89,6 +97,7 @@ impl Master {
             incarnation,
             inbox: inbox.downgrade(),
             count,
+            history: History::default(),
         };
         tokio::spawn(driver.run(messages, shutdown));
         Self {
@@ -141,6 +150,9 @@ impl Master {
         let begin = Instant::now();
         let path = stitch(plan.trajectory, parts).map_err(Error::Stitch)?;
         let stitched = begin.elapsed();
+        JOB_SECONDS.record("discretize", discretized.as_secs_f64());
+        JOB_SECONDS.record("digitize", digitized.as_secs_f64());
+        JOB_SECONDS.record("stitch", stitched.as_secs_f64());
         record.phases = [
             ("discretize", discretized),
             ("digitize", digitized),
@@ -170,6 +182,16 @@ impl Master {
         }
     }
 
+    /// What goes on, and what has happened since the event of that number.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if the master has stopped.
+    pub async fn look(&self, since: u64) -> Result<(Snapshot, Vec<Happening>)> {
+        let (reply, seen) = oneshot::channel();
+        self.tell(Message::Look { since, reply }).await?;
+        seen.await.map_err(|_| Error::Interrupted)
+    }
+
     pub(crate) async fn tell(&self, message: Message) -> Result<()> {
         self.inbox
             .send(message)
@@ -194,6 +216,7 @@ struct Driver {
     incarnation: u64,
     inbox: mpsc::WeakSender<Message>,
     count: watch::Sender<usize>,
+    history: History,
 }
 
 impl Driver {
@@ -228,7 +251,7 @@ impl Driver {
         for job in self.jobs.iter().filter_map(gone).collect::<Vec<_>>() {
             info!(job, "cancelled");
             self.apply(Event::Cancelled { job }, None);
-            self.jobs.remove(&job);
+            self.end(job, JobState::Cancelled, None);
         }
     }
 
@@ -269,6 +292,14 @@ impl Driver {
                     next_job: self.next_job,
                 });
                 let _ = reply.send(going);
+            }
+            Message::Look { since, reply } => {
+                let now = self.begin.elapsed();
+                self.history.forget_all_but(|name| self.state.has(name));
+                let seen = snapshot(&self.state, &self.jobs, &self.addresses, &self.history, now);
+                let happened = self.history.since(since).cloned().collect();
+                // Whoever wanted to see it may have gone.
+                let _ = reply.send((seen, happened));
             }
             Message::Run {
                 plan,
@@ -379,7 +410,10 @@ impl Driver {
     }
 
     fn apply(&mut self, event: Event, mut delivery: Option<Delivery>) {
-        for command in apply(&mut self.state, self.begin.elapsed(), event) {
+        self.history.happened(&event);
+        let commands = apply(&mut self.state, self.begin.elapsed(), event);
+        self.history.decided(&commands);
+        for command in commands {
             match command {
                 Command::Place { worker, task } => self.place(worker, task),
                 Command::Start { worker, task, rows } => self.start(worker, task, rows),
@@ -395,12 +429,13 @@ impl Driver {
                     if let (Some(job), Some(delivery)) =
                         (self.jobs.get_mut(&task.job), delivery.take())
                     {
+                        self.history.delivered(&delivery.record);
                         job.kept
                             .insert(task.extent, (delivery.positions, delivery.record));
                     }
                 }
                 Command::Complete { job } => {
-                    if let Some(job) = self.jobs.remove(&job) {
+                    if let Some(job) = self.end(job, JobState::Done, None) {
                         job.complete();
                     }
                 }
@@ -412,9 +447,17 @@ impl Driver {
     /// Tells whoever waits for a job that it came to nothing.
     fn fail(&mut self, job: u64, error: Error) {
         warn!(job, %error, "failed");
-        if let Some(job) = self.jobs.remove(&job) {
+        if let Some(job) = self.end(job, JobState::Failed, Some(error.to_string())) {
             let _ = job.reply.send(Err(error));
         }
+    }
+
+    /// Takes a job out that is over, and remembers what became of it.
+    fn end(&mut self, job: u64, state: JobState, reason: Option<String>) -> Option<RunningJob> {
+        let running = self.jobs.remove(&job)?;
+        self.history
+            .end(snapshot::ended(job, &running, state, reason));
+        Some(running)
     }
 
     /// Brings an extent's own rows to a worker, in the background.

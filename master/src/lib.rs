@@ -13,6 +13,10 @@ mod driver;
 mod running;
 mod state;
 
+mod history;
+mod page;
+pub mod snapshot;
+
 mod dispatch;
 mod place;
 mod received;
@@ -29,6 +33,8 @@ use tokio_util::sync::CancellationToken;
 
 pub use driver::Master;
 pub use error::{Error, Result};
+pub use history::Happening;
+pub use page::page;
 
 /// What a master has to know.
 #[derive(Debug, Clone)]

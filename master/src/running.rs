@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
 
 use horma_core::{
     Counters, Distribution, Extent, ExtentRecord, Handout, LostAttempt, Record, SubTrajectory,
@@ -21,6 +22,7 @@ use crate::state::{Fault, Held};
 type Reply = oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>;
 
 pub(crate) struct RunningJob {
+    pub begin: Instant,
     pub plan: Arc<Handout>,
     pub extents: Vec<Extent>,
     /// How many extents need each row.
@@ -34,7 +36,7 @@ pub(crate) struct RunningJob {
     pub kept: BTreeMap<u32, (Vec<SubTrajectory>, ExtentRecord)>,
     /// What placing rows has taken so far, by extent.
     pub placed: BTreeMap<u32, Placed>,
-    lost: Vec<LostAttempt>,
+    pub lost: Vec<LostAttempt>,
     /// Calls under way: each ends when it is told why, or when the job is dropped.
     pub calls: BTreeMap<TaskId, oneshot::Sender<String>>,
     workers: BTreeMap<String, String>,
@@ -50,6 +52,7 @@ impl RunningJob {
             users[row as usize] += 1;
         }
         Self {
+            begin: Instant::now(),
             plan,
             extents,
             users,
@@ -132,23 +135,40 @@ impl RunningJob {
         });
     }
 
-    /// Hands over what was kept.
-    pub fn complete(self) {
-        let mut counters = Counters::default();
+    /// Positions that have arrived, and those inserted between them.
+    pub fn so_far(&self) -> [u64; 2] {
+        [&self.arrived, &self.inserted].map(|n| n.load(Ordering::Relaxed))
+    }
+
+    /// What has travelled for what is kept, and for rows that are placed.
+    pub fn traffic(&self) -> Traffic {
         let mut traffic = Traffic {
             rows_needed: self.users.iter().filter(|&&n| n > 0).count() as u64,
             ..Traffic::default()
         };
+        for (_, record) in self.kept.values() {
+            traffic.rows_sent += record.rows_sent;
+            traffic.bytes_to_workers += record.bytes_sent;
+            traffic.bytes_between_workers += record.bytes_fetched;
+            traffic.bytes_of_results += record.bytes_received;
+        }
+        for placed in self.placed.values() {
+            traffic.rows_sent += placed.rows;
+            traffic.bytes_to_workers += placed.bytes;
+        }
+        traffic
+    }
+
+    /// Hands over what was kept.
+    pub fn complete(self) {
+        let traffic = self.traffic();
+        let mut counters = Counters::default();
         let (mut parts, mut extents) = (Vec::new(), Vec::new());
         for (extent, (positions, mut record)) in self.kept {
             let placed = self.placed.get(&extent).copied().unwrap_or_default();
             record.rows_sent += placed.rows;
             record.bytes_sent += placed.bytes;
             record.place_seconds = placed.seconds;
-            traffic.rows_sent += record.rows_sent;
-            traffic.bytes_to_workers += record.bytes_sent;
-            traffic.bytes_between_workers += record.bytes_fetched;
-            traffic.bytes_of_results += record.bytes_received;
             counters += record.counters;
             parts.extend(positions);
             extents.push(record);

@@ -10,6 +10,7 @@
 
 mod assign;
 mod lose;
+mod view;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -18,6 +19,8 @@ use horma_proto::TaskId;
 
 use self::assign::assign;
 use self::lose::{gone, lose};
+pub use self::view::ExtentState;
+pub(crate) use self::view::Member;
 use crate::error::Error;
 
 /// Failures of one extent after which it is the extent, not the workers, if all of them had a try.
@@ -199,6 +202,11 @@ impl State {
     /// Whether this start of this worker has answered wrongly before.
     pub fn distrusts(&self, worker: &str, incarnation: u64) -> bool {
         self.distrusted.get(worker) == Some(&incarnation)
+    }
+
+    /// Whether any start of this worker is a member.
+    pub fn has(&self, worker: &str) -> bool {
+        self.workers.contains_key(worker)
     }
 
     /// Number of workers.
