@@ -64,11 +64,22 @@ fn check_traffic(distribution: &str, report: &Value) {
     let [total, halo] = ["rows", "halo_rows"].map(sum);
     assert_eq!(total, needed + halo, "every row has one owner");
     let fetched = number(traffic, "bytes_between_workers");
+    // Where there are more workers than cores some are late, and idle ones help them.
+    let second = report["second"].as_array().expect("second attempts");
+    let again: u64 = second.iter().map(|s| number(s, "rows_sent")).sum();
     match distribution {
-        "overlap" => assert_eq!((sent, fetched), (total, 0), "rows travel with their halo"),
+        "overlap" => assert_eq!(
+            (sent, fetched),
+            (total + again, 0),
+            "rows travel with their halo"
+        ),
         "halo" => {
-            assert_eq!(sent, needed, "no row is sent twice");
-            assert_eq!(fetched > 0, halo > 0, "the halo is fetched");
+            assert_eq!(
+                sent,
+                needed + again,
+                "no row is sent twice but to who helps"
+            );
+            assert!(fetched > 0 || halo == 0 || again > 0, "the halo is fetched");
         }
         _ => assert_eq!((sent, fetched), (0, 0), "surfaces travel, not rows"),
     }

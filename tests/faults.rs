@@ -259,26 +259,32 @@ async fn register(
     client.register(request).await
 }
 
+fn first(task: &wire::Task) -> u64 {
+    task.runs[0].first
+}
+
 fn positions(task: &wire::Task, skip: u64, count: u64) -> DigitizeReply {
     let touches = vec![None; count as usize];
-    let positions = horma_proto::pack_positions(task.first + skip, &touches, &[]);
+    let positions = horma_proto::pack_positions(first(task) + skip, &touches, &[]);
     DigitizeReply {
         id: task.id,
         kind: Some(Kind::Positions(positions)),
+        counters: None,
     }
 }
 
 /// The first position of a task, and one inserted on the move from it or from another.
 fn inserted(task: &wire::Task, from: u64) -> DigitizeReply {
-    let index = horma_core::Index::between(task.first + from, 512);
+    let index = horma_core::Index::between(first(task) + from, 512);
     let between = [horma_core::Inserted {
         index: index.expect("between"),
         touch: None,
     }];
-    let positions = horma_proto::pack_positions(task.first, &[None], &between);
+    let positions = horma_proto::pack_positions(first(task), &[None], &between);
     DigitizeReply {
         id: task.id,
         kind: Some(Kind::Positions(positions)),
+        counters: None,
     }
 }
 
@@ -295,8 +301,8 @@ async fn workers_that_answer_wrongly_are_found_out() {
         ("twice", |task| {
             vec![positions(&task, 5, 10), positions(&task, 0, 6)]
         }),
-        ("but its extent has", |task| {
-            let too_many = task.count + 1;
+        ("or not asked for", |task| {
+            let too_many = task.runs[0].count + 1;
             vec![positions(&task, 0, too_many)]
         }),
         ("nobody asked for", |task| vec![inserted(&task, 0)]),
@@ -312,6 +318,7 @@ async fn workers_that_answer_wrongly_are_found_out() {
             vec![DigitizeReply {
                 id: task.id,
                 kind: Some(Kind::Finished(wire::Finished::default())),
+                counters: None,
             }]
         }),
         ("it asked for the rows of", |task| {
@@ -320,6 +327,7 @@ async fn workers_that_answer_wrongly_are_found_out() {
             vec![DigitizeReply {
                 id: task.id,
                 kind: Some(Kind::HaloLost(wire::HaloLost { source, reason })),
+                counters: None,
             }]
         }),
     ];

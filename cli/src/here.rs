@@ -110,7 +110,7 @@ fn digitize(
     let begin = Instant::now();
     let mut parts = Vec::new();
     let (mut inserted, mut fits) = (0, Ok(()));
-    let counters = digitizer.run_chunks(&plan.trajectory, 0..total, |run| {
+    let counters = digitizer.run_chunks(&plan.trajectory, 0..total, |run, _| {
         display.tell("digitize", run.end(), total);
         inserted += run.between.len() as u64;
         fits = plan.check_inserted(inserted);

@@ -33,6 +33,13 @@ const CHUNK: u64 = 256;
 const ROUND: u64 = 8;
 const ROUND_BETWEEN: u64 = 2;
 
+/// Number of positions of each chunk of a run, but for the last: whoever digitizes any whole chunks of it
+/// delivers the same ones.
+pub(crate) fn chunk(trajectory: &Trajectory) -> u64 {
+    let revolutions = 2 * u64::from(trajectory.points_per_revolution);
+    CHUNK.max(revolutions).min(4096)
+}
+
 /// Rows made ready to be searched.
 #[derive(Debug)]
 pub struct Digitizer {
@@ -89,19 +96,17 @@ impl Digitizer {
     }
 
     /// Digitizes consecutive positions on the current thread pool, chunk by chunk, in order, each with
-    /// what is inserted on the moves that begin there. `deliver` gets each chunk; it returns `false` to
-    /// stop.
+    /// what is inserted on the moves that begin there. `deliver` gets each chunk and what it cost; it
+    /// returns `false` to stop.
     pub fn run_chunks(
         &self,
         trajectory: &Trajectory,
         positions: Range<u64>,
-        mut deliver: impl FnMut(SubTrajectory) -> bool,
+        mut deliver: impl FnMut(SubTrajectory, Counters) -> bool,
     ) -> Counters {
         let directions = trajectory.directions();
         let threads = rayon::current_num_threads() as u64;
-        let chunk = CHUNK
-            .max(2 * u64::from(trajectory.points_per_revolution))
-            .min(4096);
+        let chunk = chunk(trajectory);
         let round = match self.path_tolerance {
             None => ROUND,
             Some(_) => ROUND_BETWEEN,
@@ -118,7 +123,7 @@ impl Digitizer {
                 .collect();
             for (chunk, cost) in chunks {
                 counters += cost;
-                if !deliver(chunk) {
+                if !deliver(chunk, cost) {
                     return counters;
                 }
             }
@@ -243,10 +248,14 @@ impl Heuristic {
         };
         let positions = 0..trajectory.positions;
         let mut exact = Vec::new();
-        Digitizer::new(&exact_job, rows, simd).run_chunks(trajectory, positions.clone(), |chunk| {
-            exact.extend(chunk.touches);
-            true
-        });
+        Digitizer::new(&exact_job, rows, simd).run_chunks(
+            trajectory,
+            positions.clone(),
+            |chunk, _| {
+                exact.extend(chunk.touches);
+                true
+            },
+        );
         Self {
             grids: Grids::new(rows, local.culling),
             cutter: job.cutter,

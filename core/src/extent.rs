@@ -11,6 +11,7 @@ use std::ops::Range;
 use crate::job::{Job, Method};
 use crate::motion::Trajectory;
 use crate::row::Outline;
+use crate::runs::Run;
 use crate::tolerance::REACH_SLACK;
 use crate::vector::Interval;
 
@@ -40,17 +41,6 @@ pub struct Halo {
     pub rows: Vec<u32>,
 }
 
-/// Positions that are digitized together, and the rows that this takes.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Run {
-    /// Index of the first position.
-    pub first: u64,
-    /// Number of positions.
-    pub count: u64,
-    /// Ids of the rows they need, in order.
-    pub rows: Vec<u32>,
-}
-
 impl Extent {
     /// All of it as one run.
     pub fn whole(&self) -> Run {
@@ -70,6 +60,7 @@ pub fn split(trajectory: &Trajectory, outlines: &[Outline], job: &Job, parts: u3
     let w = job.cutter.half_width() + REACH_SLACK;
     let reach = Reach::new(outlines);
     let blocks = trajectory.positions.min(SAMPLES);
+    let parts = parts.min(blocks as u32);
     let block =
         |i: u64| (u128::from(trajectory.positions) * u128::from(i) / u128::from(blocks)) as u64;
     let mut total = 0.0;
@@ -113,7 +104,7 @@ pub fn split(trajectory: &Trajectory, outlines: &[Outline], job: &Job, parts: u3
 }
 
 /// The travel of positions, and of the one that their last move ends at where positions are inserted.
-fn seen(trajectory: &Trajectory, job: &Job, positions: Range<u64>) -> Interval {
+pub(crate) fn seen(trajectory: &Trajectory, job: &Job, positions: Range<u64>) -> Interval {
     let Range { start, end } = positions;
     let end = match job.motion.path_tolerance {
         Some(_) => trajectory.positions.min(end + 1),
@@ -150,78 +141,13 @@ fn give_to_owners(extents: &mut [Extent], outlines: &[Outline], trajectory: &Tra
     }
 }
 
-/// A second hierarchy pays if this share of the positions need not wait for it.
-const WORTH_IT: f64 = 0.25;
-
-/// The longest run of an extent's positions that need only its own rows, then what is before and what
-/// is after it; all of it as one run if that would be too short to be worth it.
-pub(crate) fn interior_first(
-    trajectory: &Trajectory,
-    outlines: &[Outline],
-    job: &Job,
-    extent: &Extent,
-) -> Vec<Run> {
-    let w = job.cutter.half_width() + REACH_SLACK;
-    let (begin, end) = (extent.first, extent.first + extent.count);
-    // Positions from which each row of the halo is in reach; travel never decreases.
-    let mut edges: Vec<(u64, u64)> = Vec::new();
-    for &row in extent.halo.iter().flat_map(|h| &h.rows) {
-        let before = (row as usize).checked_sub(1).map(|i| outlines[i]);
-        let strip = before.filter(|o| o.joins_next).map(|o| o.x);
-        let x = strip.map_or(outlines[row as usize].x, |s| {
-            s.hull(outlines[row as usize].x)
-        });
-        let clear = |i| seen(trajectory, job, i..i + 1).high + w < x.low;
-        let from = partition(begin, end, clear);
-        let to = partition(begin, end, |i| trajectory.travel(i) - w <= x.high);
-        edges.push((from, to));
-    }
-    edges.sort_unstable();
-    let (mut interior, mut next) = (begin..begin, begin);
-    for (from, to) in edges.into_iter().chain([(end, end)]) {
-        if from.saturating_sub(next) > interior.end - interior.start {
-            interior = next..from;
-        }
-        next = next.max(to);
-    }
-    let run = |positions: Range<u64>| Run {
-        first: positions.start,
-        count: positions.end - positions.start,
-        rows: rows_within(outlines, seen(trajectory, job, positions).widened(w)),
-    };
-    let inner = run(interior.clone());
-    let needs_no_others = inner
-        .rows
-        .iter()
-        .all(|r| extent.own.binary_search(r).is_ok());
-    if !needs_no_others || (inner.count as f64) < WORTH_IT * extent.count as f64 {
-        return vec![extent.whole()];
-    }
-    let around = [begin..interior.start, interior.end..end].map(run);
-    let around = around.into_iter().filter(|run| run.count > 0);
-    std::iter::once(inner).chain(around).collect()
-}
-
-/// The first of `begin..end` for which `holds` no longer does.
-fn partition(begin: u64, end: u64, holds: impl Fn(u64) -> bool) -> u64 {
-    let (mut low, mut high) = (begin, end);
-    while low < high {
-        let middle = low + (high - low) / 2;
-        if holds(middle) {
-            low = middle + 1;
-        } else {
-            high = middle;
-        }
-    }
-    low
-}
-
-/// Predicted work of a position with so many candidates within the cutter's width. The exact
-/// search descends a tree, brute force tries all; a position with nothing in reach is nearly free.
+/// Predicted work of a position with so many candidates within the cutter's width. What the exact
+/// search's counters show grows as the fourth root, over grids from three to a hundred thousand points
+/// in reach; brute force tries all; a position with nothing in reach is nearly free.
 fn predicted(method: Method, candidates: u64) -> f64 {
     let n = candidates as f64;
     match method {
-        Method::Exact => 0.05 + libm::log2(1.0 + n),
+        Method::Exact => 0.05 + libm::sqrt(libm::sqrt(n)),
         Method::Brute => 0.05 + n,
         // The windows are the same everywhere.
         Method::Local(_) => 1.0,
@@ -229,7 +155,7 @@ fn predicted(method: Method, candidates: u64) -> f64 {
 }
 
 /// Ids of the rows of which something lies within `window`, with the rows their facets lead to.
-fn rows_within(outlines: &[Outline], window: Interval) -> Vec<u32> {
+pub(crate) fn rows_within(outlines: &[Outline], window: Interval) -> Vec<u32> {
     let mut rows = Vec::new();
     let mut wanted = false;
     for (id, outline) in (0u32..).zip(outlines) {
@@ -283,6 +209,7 @@ mod tests {
     use crate::cutter::Cutter;
     use crate::job::{Contact, Discretization};
     use crate::motion::{Motion, MotionKind};
+    use crate::runs::interior_first;
     use proptest::prelude::*;
 
     fn job(radius: f64, path_tolerance: Option<f64>) -> Job {

@@ -28,6 +28,7 @@ mod row;
 
 mod extent;
 mod plan;
+mod runs;
 
 mod simd;
 
@@ -56,7 +57,7 @@ pub use cutter::Cutter;
 pub use digitize::{Digitizer, Heuristic};
 pub use discretize::{Model, discretize};
 pub use error::{Error, Result};
-pub use extent::{Extent, Halo, Run};
+pub use extent::{Extent, Halo};
 pub use grid::SurfaceGrid;
 pub use job::{Contact, Culling, Discretization, Distribution, Job, Local, Method, Window};
 pub use motion::{Index, Motion, MotionKind, Trajectory};
@@ -65,8 +66,9 @@ pub use path::{Inserted, SubTrajectory, ToolPath, Touch, Waypoint, stitch};
 pub use placement::{Axis, place};
 pub use plan::{Handout, Plan, Stock};
 pub use record::{BodyRecord, Counters, ExtentRecord, LostAttempt, Phase, Record};
-pub use record::{Traffic, WorkerRecord};
+pub use record::{SecondAttempt, Share, Traffic, WorkerRecord};
 pub use row::{Outline, Row, RowKind};
+pub use runs::Run;
 pub use simd::Simd;
 pub use surface::{Direction, MAX_DEGREE, Surface};
 pub use tolerance::MAX_COORDINATE;

@@ -1,14 +1,17 @@
 //! The plan: everything that follows from a part and a job before the first position is digitized.
 
+use std::ops::Range;
+
 use crate::discretize::{Layout, Model, fill, layout, survey};
 use crate::error::{Error, Result};
-use crate::extent::{Extent, Run, interior_first, split};
+use crate::extent::{Extent, split};
 use crate::grid::SurfaceGrid;
 use crate::job::{Discretization, Distribution, Job, Method};
 use crate::motion::Trajectory;
 use crate::part::{Part, Shape};
 use crate::record::BodyRecord;
 use crate::row::{Outline, Row};
+use crate::runs::{Run, from_behind, interior_first, remaining};
 use crate::vector::Interval;
 
 /// A job ready to be digitized, here or elsewhere.
@@ -157,6 +160,17 @@ impl Handout {
     /// [`Error::TooManyInserted`]
     pub fn check_inserted(&self, inserted: u64) -> Result<()> {
         check_inserted(inserted, self.most_inserted)
+    }
+
+    /// The runs that are left of an extent when only these of its positions are missing, which ascend:
+    /// in order, or for someone who `helps` another one that is at them.
+    pub fn runs_left(&self, extent: &Extent, missing: &[Range<u64>], helps: bool) -> Vec<Run> {
+        let (trajectory, outlines, job) = (&self.trajectory, &self.outlines, &self.job);
+        let left = remaining(trajectory, outlines, job, &self.runs(extent), missing);
+        if helps {
+            return from_behind(trajectory, outlines, job, left);
+        }
+        left
     }
 
     /// The runs in which a worker digitizes an extent: what needs only the extent's own rows first, if

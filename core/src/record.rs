@@ -24,6 +24,8 @@ pub struct Record {
     pub extents: Vec<ExtentRecord>,
     /// Attempts that came to nothing and were made again.
     pub lost: Vec<LostAttempt>,
+    /// Attempts by idle workers at what others were at or were to do later.
+    pub second: Vec<SecondAttempt>,
 }
 
 /// How long a phase took.
@@ -80,12 +82,13 @@ impl Counters {
 }
 
 impl std::ops::AddAssign for Counters {
+    // They may have come from anywhere.
     fn add_assign(&mut self, other: Self) {
-        self.evaluations += other.evaluations;
-        self.nodes += other.nodes;
-        self.lost += other.lost;
+        self.evaluations = self.evaluations.saturating_add(other.evaluations);
+        self.nodes = self.nodes.saturating_add(other.nodes);
+        self.lost = self.lost.saturating_add(other.lost);
         self.largest_loss = self.largest_loss.max(other.largest_loss);
-        self.beyond_tolerance += other.beyond_tolerance;
+        self.beyond_tolerance = self.beyond_tolerance.saturating_add(other.beyond_tolerance);
     }
 }
 
@@ -113,15 +116,17 @@ pub struct WorkerRecord {
     pub address: String,
 }
 
-/// How an extent was digitized.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// How an extent was digitized. Seconds are those of the attempt that completed it.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ExtentRecord {
     /// Number in the job.
     pub extent: u32,
-    /// The attempt that succeeded, from 1.
+    /// The attempt that completed it, from 1.
     pub attempt: u32,
     /// By whom.
     pub worker: String,
+    /// Who brought how many of its positions, by attempt.
+    pub shares: Vec<Share>,
     /// First position.
     pub first: u64,
     /// Number of positions.
@@ -134,11 +139,11 @@ pub struct ExtentRecord {
     pub halo_rows: u32,
     /// Rows that the master sent for it, each as often as it was sent.
     pub rows_sent: u64,
-    /// Bytes from master to worker.
+    /// Bytes from the master to all who tried it.
     pub bytes_sent: u64,
-    /// Bytes of rows from other workers.
+    /// Bytes of rows from other workers, for the attempt that completed it.
     pub bytes_fetched: u64,
-    /// Bytes from worker to master.
+    /// Bytes to the master from all who tried it.
     pub bytes_received: u64,
     /// Wall time of sending its own rows ahead of all tasks, s.
     pub place_seconds: f64,
@@ -158,6 +163,34 @@ pub struct ExtentRecord {
     pub counters: Counters,
 }
 
+/// What one attempt brought of an extent.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Share {
+    /// The attempt, from 1.
+    pub attempt: u32,
+    /// By whom.
+    pub worker: String,
+    /// Number of positions; what two brought counts for the first.
+    pub positions: u64,
+}
+
+/// An attempt by an idle worker at an extent that was another's.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SecondAttempt {
+    /// The extent.
+    pub extent: u32,
+    /// The attempt, from 2.
+    pub attempt: u32,
+    /// By whom.
+    pub worker: String,
+    /// Positions that were missing when it began.
+    pub positions: u64,
+    /// Rows that the master sent with it.
+    pub rows_sent: u64,
+    /// Why.
+    pub reason: String,
+}
+
 /// An attempt that came to nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LostAttempt {
@@ -167,7 +200,7 @@ pub struct LostAttempt {
     pub attempt: u32,
     /// By whom.
     pub worker: String,
-    /// Positions that had arrived, and were thrown away.
+    /// Positions that had arrived: kept, unless the answer was wrong.
     pub positions_received: u64,
     /// Positions of the extent.
     pub positions: u64,

@@ -63,7 +63,7 @@ fn path(kind: MotionKind, path_tolerance: Option<f64>) -> (ToolPath, u64) {
     let digitizer = Digitizer::new(&plan.job, &plan.model.rows, Simd::best());
     let mut parts = Vec::new();
     let all = 0..plan.trajectory.positions;
-    let counters = digitizer.run_chunks(&plan.trajectory, all, |run| {
+    let counters = digitizer.run_chunks(&plan.trajectory, all, |run, _| {
         parts.push(run);
         true
     });

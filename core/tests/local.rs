@@ -66,7 +66,7 @@ fn run(method: Method) -> (Vec<Option<Touch>>, Counters) {
     let digitizer = Digitizer::new(&plan.job, &plan.model.rows, Simd::best());
     let mut touches = Vec::new();
     let all = 0..plan.trajectory.positions;
-    let counters = digitizer.run_chunks(&plan.trajectory, all, |chunk| {
+    let counters = digitizer.run_chunks(&plan.trajectory, all, |chunk, _| {
         touches.extend(chunk.touches);
         true
     });
@@ -169,7 +169,7 @@ fn between_positions_windows_with_the_fallback_are_as_good_as_any() {
         let digitizer = Digitizer::new(&plan.job, &plan.model.rows, Simd::best());
         let mut parts = Vec::new();
         let all = 0..plan.trajectory.positions;
-        digitizer.run_chunks(&plan.trajectory, all, |run| {
+        digitizer.run_chunks(&plan.trajectory, all, |run, _| {
             parts.push(run);
             true
         });

@@ -1,10 +1,10 @@
 //! Dispatch: one task to one worker, and its positions back, checked as they come.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use horma_core::{Extent, ExtentRecord, Handout, Run, Stock, SubTrajectory};
+use horma_core::{Counters, Extent, ExtentRecord, Handout, Run, Stock};
 use horma_proto::metrics::{POSITIONS, TRAFFIC};
 use horma_proto::transport::{self, Trouble};
 use horma_proto::wire::digitize_reply::Kind as Reply;
@@ -17,9 +17,10 @@ use prost::Message;
 use tokio::sync::oneshot;
 use tonic::transport::Channel;
 use tonic::{Status, Streaming};
+use tracing::debug;
 
 use crate::Progress;
-use crate::received::Received;
+use crate::received::{Received, Sent, Taken};
 use crate::state::{Fault, Held};
 
 /// All that an attempt needs.
@@ -30,8 +31,16 @@ pub(crate) struct Attempt {
     pub plan: Arc<Handout>,
     pub extent: Extent,
     pub overlap_rows: u32,
+    /// What it is to do of the extent.
+    pub runs: Vec<Run>,
+    /// The rows that go with the task: none if workers hold them or make them.
+    pub rows: Vec<u32>,
     /// Who holds the rows, the worker's own first, and where; nobody if they come with the task.
     pub holders: Vec<(Held, String)>,
+    /// What has come of the extent, by whomever.
+    pub coming: Arc<Coming>,
+    /// Positions that this attempt has sent so far.
+    pub came: Arc<AtomicU64>,
     /// Positions of the job that have arrived so far.
     pub arrived: Arc<AtomicU64>,
     /// Those of them that were inserted, which `arrived` does not count.
@@ -40,10 +49,30 @@ pub(crate) struct Attempt {
     pub tls: Option<Tls>,
 }
 
-/// A task, delivered.
-pub(crate) struct Delivery {
-    pub positions: Vec<SubTrajectory>,
-    pub record: ExtentRecord,
+/// An extent on its way, from one worker or two.
+#[derive(Default)]
+pub(crate) struct Coming {
+    received: Mutex<Received>,
+    /// Bytes that were sent for it.
+    pub sent: Arc<AtomicU64>,
+    /// Bytes that have come.
+    pub bytes: AtomicU64,
+}
+
+impl Coming {
+    /// Nothing yet of an extent.
+    pub fn of(extent: &Extent) -> Self {
+        Self {
+            received: Mutex::new(Received::new(extent.first, extent.count)),
+            ..Self::default()
+        }
+    }
+
+    /// What has come. Not for as long as anything is waited for.
+    pub fn received(&self) -> MutexGuard<'_, Received> {
+        // Every change is a single call: there is no half of one to be seen.
+        self.received.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// A task that was not delivered.
@@ -52,39 +81,30 @@ pub(crate) struct Undelivered {
     pub positions_received: u64,
 }
 
-/// Makes the attempt; `cut_off` ends it early and says why.
+/// Makes the attempt; `cut_off` ends it early and says why. It is over as soon as nothing of the extent
+/// is missing.
 pub(crate) async fn dispatch(
     attempt: Attempt,
     cut_off: oneshot::Receiver<String>,
-) -> Result<Delivery, Undelivered> {
-    let mut received = Received::new(attempt.extent.first, attempt.extent.count);
-    let call = call(&attempt, &mut received);
+) -> Result<ExtentRecord, Undelivered> {
+    let asked = attempt.runs.iter().map(|r| r.first..r.first + r.count);
+    let mut sent = Sent::nothing_of(asked);
+    let call = call(&attempt, &mut sent);
     let outcome = tokio::select! {
         outcome = call => outcome,
         reason = cut_off => Err(Fault::Lost(reason.unwrap_or("the job is over".to_owned()))),
     };
-    match outcome {
-        Ok(record) => Ok(Delivery {
-            positions: received.into_parts(),
-            record,
-        }),
-        Err(fault) => {
-            let positions_received = received.so_far();
-            attempt
-                .arrived
-                .fetch_sub(positions_received, Ordering::Relaxed);
-            // Beyond what there is memory for the job is over, and the driver has to see it.
-            let all = attempt.inserted.load(Ordering::Relaxed);
-            if attempt.plan.check_inserted(all).is_ok() {
-                let inserted = received.inserted();
-                attempt.inserted.fetch_sub(inserted, Ordering::Relaxed);
-            }
-            Err(Undelivered {
-                fault,
-                positions_received,
-            })
+    outcome.map_err(|fault| {
+        if matches!(fault, Fault::Wrong(_)) {
+            let (positions, inserted) = attempt.coming.received().forget(attempt.task.attempt);
+            attempt.arrived.fetch_sub(positions, Ordering::Relaxed);
+            attempt.inserted.fetch_sub(inserted, Ordering::Relaxed);
         }
-    }
+        Undelivered {
+            fault,
+            positions_received: sent.so_far(),
+        }
+    })
 }
 
 /// A connection to a worker.
@@ -102,19 +122,13 @@ pub(crate) async fn connect(
         .max_encoding_message_size(MAX_MESSAGE))
 }
 
-async fn call(attempt: &Attempt, received: &mut Received) -> Result<ExtentRecord, Fault> {
+async fn call(attempt: &Attempt, sent: &mut Sent) -> Result<ExtentRecord, Fault> {
     let begin = Instant::now();
     let mut client = connect(&attempt.address, attempt.tls.as_ref()).await?;
-    let sent = Arc::new(AtomicU64::new(0));
-    let replies = client.digitize(requests(attempt, sent.clone())).await;
+    let replies = client.digitize(requests(attempt)).await;
     let mut replies = replies.map_err(|s| fault(&s))?.into_inner();
-    let (finished, bytes_received) = receive(attempt, received, &mut replies).await?;
-    let counters = finished.counters.unwrap_or_default();
+    let finished = receive(attempt, sent, &mut replies).await?;
     let halo_rows = attempt.extent.halo.iter().map(|h| h.rows.len() as u32);
-    let with_task = match (&attempt.plan.stock, attempt.holders.is_empty()) {
-        (Stock::Rows(_), true) => attempt.extent.rows.len() as u64,
-        (Stock::Rows(_), false) | (Stock::Grids(_), _) => 0,
-    };
     Ok(ExtentRecord {
         extent: attempt.task.extent,
         attempt: attempt.task.attempt,
@@ -124,29 +138,24 @@ async fn call(attempt: &Attempt, received: &mut Received) -> Result<ExtentRecord
         rows: attempt.extent.rows.len() as u32,
         overlap_rows: attempt.overlap_rows,
         halo_rows: halo_rows.sum(),
-        rows_sent: with_task,
-        bytes_sent: sent.load(Ordering::Relaxed),
         bytes_fetched: finished.halo_bytes,
-        bytes_received,
-        // Known to whoever placed them.
-        place_seconds: 0.0,
         seconds: begin.elapsed().as_secs_f64(),
         receive_seconds: finished.receive_seconds,
         make_seconds: finished.make_seconds,
         halo_seconds: finished.halo_seconds,
         build_seconds: finished.build_seconds,
         digitize_seconds: finished.digitize_seconds,
-        counters: horma_proto::counters_from_wire(counters),
+        // The rest is known once the extent is complete.
+        ..ExtentRecord::default()
     })
 }
 
 /// The task and what its rows come from, packed as they are sent.
 fn requests(
     attempt: &Attempt,
-    sent: Arc<AtomicU64>,
 ) -> impl tokio_stream::Stream<Item = DigitizeRequest> + Send + 'static {
     let (supply, chunks) = supply(attempt);
-    let run = |run: Run| wire::Run {
+    let run = |run: &Run| wire::Run {
         first: run.first,
         count: run.count,
         rows: horma_proto::spans_of(&run.rows),
@@ -155,16 +164,10 @@ fn requests(
         id: Some(attempt.task.into()),
         job: Some(horma_proto::job_to_wire(&attempt.plan.job)),
         trajectory: Some(horma_proto::trajectory_to_wire(&attempt.plan.trajectory)),
-        first: attempt.extent.first,
-        count: attempt.extent.count,
-        runs: attempt
-            .plan
-            .runs(&attempt.extent)
-            .into_iter()
-            .map(run)
-            .collect(),
+        runs: attempt.runs.iter().map(run).collect(),
         supply: Some(supply),
     };
+    let sent = attempt.coming.sent.clone();
     let requests = std::iter::once(Request::Task(task)).chain(chunks.map(Request::Rows));
     tokio_stream::iter(requests.map(move |kind| {
         let request = DigitizeRequest { kind: Some(kind) };
@@ -179,7 +182,7 @@ type AllChunks = Box<dyn Iterator<Item = wire::Chunk> + Send>;
 
 /// How the worker comes by its rows. This is all in which the distributions differ here.
 fn supply(attempt: &Attempt) -> (Supply, AllChunks) {
-    let (plan, rows) = (attempt.plan.clone(), attempt.extent.rows.clone());
+    let (plan, rows) = (attempt.plan.clone(), attempt.rows.clone());
     match (&attempt.plan.stock, &attempt.holders[..]) {
         (_, [(own, _), others @ ..]) => {
             let source = |(held, address): &(Held, String)| wire::Source {
@@ -199,7 +202,8 @@ fn supply(attempt: &Attempt) -> (Supply, AllChunks) {
             (supply, Box::new(Chunks::of(rows_to_wire(plan, rows))))
         }
         (Stock::Grids(grids), []) => {
-            let grids = grids.iter().filter_map(|grid| grid.only(&rows));
+            let needed = needed(&attempt.runs);
+            let grids = grids.iter().filter_map(|grid| grid.only(&needed));
             let grids: Vec<_> = grids.map(|g| horma_proto::grid_to_wire(&g)).collect();
             let supply = Supply::Grids(grids.len() as u32);
             (supply, Box::new(Chunks::of(grids.into_iter())))
@@ -224,42 +228,39 @@ pub(crate) fn rows_to_wire(
     })
 }
 
-/// Takes the positions in; every one must come once, for this very task.
+/// The rows that runs need together, in order.
+pub(crate) fn needed(runs: &[Run]) -> Vec<u32> {
+    let mut rows: Vec<u32> = runs.iter().flat_map(|run| run.rows.clone()).collect();
+    rows.sort_unstable();
+    rows.dedup();
+    rows
+}
+
+/// Takes the positions in, each once and for this very task, until all are there.
 async fn receive(
     attempt: &Attempt,
-    received: &mut Received,
+    sent: &mut Sent,
     replies: &mut Streaming<DigitizeReply>,
-) -> Result<(wire::Finished, u64), Fault> {
+) -> Result<wire::Finished, Fault> {
     let wrong = |error: Error| Fault::Wrong(error.to_string());
-    let total = attempt.plan.trajectory.positions;
-    let mut bytes = 0;
     while let Some(reply) = replies.message().await.map_err(|s| fault(&s))? {
-        let reply_bytes = reply.encoded_len() as u64;
-        bytes += reply_bytes;
-        TRAFFIC.add("results", reply_bytes);
+        let bytes = reply.encoded_len() as u64;
+        attempt.coming.bytes.fetch_add(bytes, Ordering::Relaxed);
+        TRAFFIC.add("results", bytes);
         let id: TaskId = reply.id.try_into().map_err(wrong)?;
         if id != attempt.task {
             return Err(Fault::Wrong(format!("it speaks of {id}")));
         }
-        let left = received.left();
         match reply.kind {
             Some(Reply::Positions(positions)) => {
-                let run = horma_proto::unpack_positions(&positions, total).map_err(wrong)?;
-                let count = run.touches.len() as u64;
-                let inserted = run.between.len() as u64;
-                if inserted > 0 && attempt.plan.job.motion.path_tolerance.is_none() {
-                    let why = "it inserted positions that nobody asked for";
-                    return Err(Fault::Wrong(why.to_owned()));
+                let cost = horma_proto::counters_from_wire(reply.counters.unwrap_or_default());
+                take(attempt, sent, &positions, cost)?;
+                if sent.left() > 0 && attempt.coming.received().left() == 0 {
+                    // The rest has come from whoever it helps, or is helped by.
+                    return Ok(wire::Finished::default());
                 }
-                received.take(run).map_err(Fault::Wrong)?;
-                let all = attempt.inserted.fetch_add(inserted, Ordering::Relaxed) + inserted;
-                let fits = attempt.plan.check_inserted(all);
-                fits.map_err(|e| Fault::Lost(e.to_string()))?;
-                POSITIONS.add("", count);
-                let arrived = attempt.arrived.fetch_add(count, Ordering::Relaxed) + count;
-                (attempt.progress)("digitize", arrived, total);
             }
-            Some(Reply::Finished(finished)) if left == 0 => {
+            Some(Reply::Finished(finished)) if sent.left() == 0 => {
                 let wire::Finished {
                     build_seconds,
                     digitize_seconds,
@@ -273,9 +274,10 @@ async fn receive(
                 if !seconds.is_finite() {
                     return Err(Fault::Wrong(format!("it worked for {seconds} s")));
                 }
-                return Ok((finished, bytes));
+                return Ok(finished);
             }
             Some(Reply::Finished(_)) => {
+                let left = sent.left();
                 return Err(Fault::Wrong(format!(
                     "it finished with {left} positions left"
                 )));
@@ -293,6 +295,43 @@ async fn receive(
         }
     }
     Err(Fault::Lost("it ended its answer early".to_owned()))
+}
+
+/// Takes in the positions of one message.
+fn take(
+    attempt: &Attempt,
+    sent: &mut Sent,
+    positions: &wire::Positions,
+    cost: Counters,
+) -> Result<(), Fault> {
+    let total = attempt.plan.trajectory.positions;
+    let run = horma_proto::unpack_positions(positions, total);
+    let run = run.map_err(|error| Fault::Wrong(error.to_string()))?;
+    let (count, inserted) = (run.touches.len() as u64, run.between.len() as u64);
+    if inserted > 0 && attempt.plan.job.motion.path_tolerance.is_none() {
+        let why = "it inserted positions that nobody asked for";
+        return Err(Fault::Wrong(why.to_owned()));
+    }
+    POSITIONS.add("", count);
+    sent.note(run.first..run.end()).map_err(Fault::Wrong)?;
+    attempt.came.store(sent.so_far(), Ordering::Relaxed);
+    let (first, worker) = (run.first, &attempt.worker);
+    debug!(task = %attempt.task, worker, first, count, "positions");
+    let taken = attempt
+        .coming
+        .received()
+        .take(attempt.task.attempt, run, cost);
+    match taken {
+        Taken::New => {}
+        Taken::Again => return Ok(()),
+        Taken::Different { attempt } => return Err(Fault::Different { attempt }),
+    }
+    let all = attempt.inserted.fetch_add(inserted, Ordering::Relaxed) + inserted;
+    let fits = attempt.plan.check_inserted(all);
+    fits.map_err(|e| Fault::Lost(e.to_string()))?;
+    let arrived = attempt.arrived.fetch_add(count, Ordering::Relaxed) + count;
+    (attempt.progress)("digitize", arrived, total);
+    Ok(())
 }
 
 /// What a status says of the worker. Only an answer about the content is the worker's fault; a

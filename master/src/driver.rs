@@ -8,14 +8,16 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-use horma_core::{Distribution, Handout, Job, Part, Phase, Record, SubTrajectory, stitch};
+use horma_core::{
+    Distribution, ExtentRecord, Handout, Job, Part, Phase, Record, SubTrajectory, stitch,
+};
 use horma_proto::TaskId;
 use horma_proto::metrics::JOB_SECONDS;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
-use crate::dispatch::{Delivery, Undelivered, dispatch};
+use crate::dispatch::{Undelivered, dispatch};
 use crate::error::{Error, Result};
 use crate::history::{Happening, History};
 use crate::place::{Placed, place};
@@ -72,7 +74,7 @@ pub(crate) enum Message {
     Over {
         worker: String,
         task: TaskId,
-        outcome: std::result::Result<Delivery, Undelivered>,
+        outcome: std::result::Result<ExtentRecord, Undelivered>,
     },
     /// Rows are placed, or not.
     Placed {
@@ -245,6 +247,18 @@ impl Driver {
     }
 
     fn tick(&mut self) {
+        let far = self.jobs.values().flat_map(RunningJob::progress);
+        for (worker, task, came, left) in far.collect::<Vec<_>>() {
+            self.apply(
+                Event::Progress {
+                    worker,
+                    task,
+                    came,
+                    left,
+                },
+                None,
+            );
+        }
         self.apply(Event::Tick, None);
         // A client that no longer waits has cancelled its job.
         let gone = |(&id, job): (&u64, &RunningJob)| job.reply.is_closed().then_some(id);
@@ -295,7 +309,6 @@ impl Driver {
             }
             Message::Look { since, reply } => {
                 let now = self.begin.elapsed();
-                self.history.forget_all_but(|name| self.state.has(name));
                 let seen = snapshot(&self.state, &self.jobs, &self.addresses, &self.history, now);
                 let happened = self.history.since(since).cloned().collect();
                 // Whoever wanted to see it may have gone.
@@ -374,12 +387,14 @@ impl Driver {
         &mut self,
         worker: String,
         task: TaskId,
-        outcome: std::result::Result<Delivery, Undelivered>,
+        outcome: std::result::Result<ExtentRecord, Undelivered>,
     ) {
         let Some(job) = self.jobs.get_mut(&task.job) else {
             return;
         };
-        job.calls.remove(&task);
+        let overtaken = job.kept.contains_key(&task.extent);
+        let left = job.left(task.extent);
+        let came = job.calls.remove(&task).map(|call| call.came());
         let inserted = job.inserted.load(Ordering::Relaxed);
         if let Err(error) = job.plan.check_inserted(inserted) {
             self.apply(Event::Cancelled { job: task.job }, None);
@@ -387,10 +402,21 @@ impl Driver {
             return;
         }
         match outcome {
-            Ok(delivery) => {
-                info!(%task, worker, "delivered");
-                self.apply(Event::Delivered { worker, task }, Some(delivery));
+            Ok(record) => {
+                info!(%task, worker, left, "delivered");
+                if let Some(came) = came {
+                    let worker = worker.clone();
+                    let progress = Event::Progress {
+                        worker,
+                        task,
+                        came,
+                        left,
+                    };
+                    self.apply(progress, None);
+                }
+                self.apply(Event::Delivered { worker, task, left }, Some(record));
             }
+            Err(_) if overtaken => info!(%task, worker, "overtaken"),
             Err(Undelivered {
                 fault,
                 positions_received,
@@ -409,29 +435,31 @@ impl Driver {
         }
     }
 
-    fn apply(&mut self, event: Event, mut delivery: Option<Delivery>) {
+    fn apply(&mut self, event: Event, mut record: Option<ExtentRecord>) {
         self.history.happened(&event);
         let commands = apply(&mut self.state, self.begin.elapsed(), event);
         self.history.decided(&commands);
         for command in commands {
             match command {
                 Command::Place { worker, task } => self.place(worker, task),
-                Command::Start { worker, task, rows } => self.start(worker, task, rows),
+                Command::Start {
+                    worker,
+                    task,
+                    rows,
+                    helps,
+                } => self.start(worker, task, rows, helps),
                 Command::Abort { task, reason } => {
                     info!(%task, reason, "aborted");
                     let job = self.jobs.get_mut(&task.job);
                     if let Some(call) = job.and_then(|j| j.calls.remove(&task)) {
                         // A call that is over by now needs no telling.
-                        let _ = call.send(reason);
+                        let _ = call.cut_off.send(reason);
                     }
                 }
                 Command::Keep { task } => {
-                    if let (Some(job), Some(delivery)) =
-                        (self.jobs.get_mut(&task.job), delivery.take())
+                    if let (Some(job), Some(record)) = (self.jobs.get_mut(&task.job), record.take())
                     {
-                        self.history.delivered(&delivery.record);
-                        job.kept
-                            .insert(task.extent, (delivery.positions, delivery.record));
+                        job.keep(task.extent, record);
                     }
                 }
                 Command::Complete { job } => {
@@ -480,7 +508,7 @@ impl Driver {
     }
 
     /// Brings a task to a worker, in the background.
-    fn start(&mut self, worker: String, task: TaskId, rows: Vec<Held>) {
+    fn start(&mut self, worker: String, task: TaskId, rows: Vec<Held>, helps: Option<String>) {
         let (Some(job), Some(address)) =
             (self.jobs.get_mut(&task.job), self.addresses.get(&worker))
         else {
@@ -493,8 +521,8 @@ impl Driver {
         };
         let holders = rows.into_iter().map(located).collect();
         let tls = self.config.tls.clone();
-        let attempt = job.attempt(task, &worker, address, holders, tls);
-        info!(%task, worker, positions = attempt.extent.count, "started");
+        info!(%task, worker, helps, "started");
+        let attempt = job.attempt(task, &worker, address, holders, helps, tls);
         self.report_when_over(async move {
             Message::Over {
                 worker,

@@ -30,6 +30,14 @@ pub enum Error {
         /// How the last attempt ended.
         last: String,
     },
+    /// Two workers that found different positions: nobody knows which of them is right.
+    #[error("attempts {0} and {1} at extent {extent} brought different positions", attempts.0, attempts.1)]
+    Different {
+        /// The extent.
+        extent: u32,
+        /// The two attempts.
+        attempts: (u32, u32),
+    },
     /// Stitching found that the sub-trajectories do not make a path.
     #[error("the workers' positions do not make a path: {0}")]
     Stitch(horma_core::Error),

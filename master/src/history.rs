@@ -1,10 +1,9 @@
-//! What has happened lately: events in words for those who watch, the last jobs that are over, and what
-//! each worker has delivered. It forgets what is old, and nothing depends on it.
+//! What has happened lately: events in words for those who watch, and the last jobs that are
+//! over. It forgets what is old, and nothing depends on it.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use horma_core::ExtentRecord;
 use horma_proto::metrics::{ATTEMPTS_LOST, JOBS_ENDED};
 use serde::Serialize;
 
@@ -30,21 +29,12 @@ pub struct Happening {
     pub text: String,
 }
 
-/// What a worker has delivered.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Done {
-    pub positions: u64,
-    /// That its tasks took, s.
-    pub seconds: f64,
-}
-
 /// All that is remembered.
 #[derive(Debug, Default)]
 pub(crate) struct History {
     happenings: VecDeque<Happening>,
     last: u64,
     ended: VecDeque<Job>,
-    done: BTreeMap<String, Done>,
 }
 
 impl History {
@@ -55,6 +45,7 @@ impl History {
                 Fault::Lost(_) => "lost",
                 Fault::Wrong(_) => "wrong",
                 Fault::Halo { .. } => "halo",
+                Fault::Different { .. } => "different",
             };
             ATTEMPTS_LOST.add(reason, 1);
         }
@@ -84,13 +75,6 @@ impl History {
         });
     }
 
-    /// Writes down that an extent was delivered.
-    pub fn delivered(&mut self, record: &ExtentRecord) {
-        let done = self.done.entry(record.worker.clone()).or_default();
-        done.positions += record.positions;
-        done.seconds += record.seconds;
-    }
-
     /// Writes down that a job is over.
     pub fn end(&mut self, job: Job) {
         let outcome = match job.state {
@@ -103,11 +87,6 @@ impl History {
         self.ended.truncate(ENDED);
     }
 
-    /// Forgets what workers have delivered that are no members any more.
-    pub fn forget_all_but(&mut self, member: impl Fn(&str) -> bool) {
-        self.done.retain(|name, _| member(name));
-    }
-
     /// What came after that event; all of it if that was before this master's start.
     pub fn since(&self, id: u64) -> impl Iterator<Item = &Happening> {
         let id = if id > self.last { 0 } else { id };
@@ -118,17 +97,12 @@ impl History {
     pub fn ended(&self) -> impl Iterator<Item = &Job> {
         self.ended.iter()
     }
-
-    /// What a worker has delivered.
-    pub fn done_by(&self, worker: &str) -> Done {
-        self.done.get(worker).copied().unwrap_or_default()
-    }
 }
 
 /// An event in words; true where something went wrong.
 fn event_in_words(event: &Event) -> Option<(bool, String)> {
     match event {
-        Event::Heartbeat { .. } | Event::Tick => None,
+        Event::Heartbeat { .. } | Event::Tick | Event::Progress { .. } => None,
         Event::Registered { worker, .. } => Some((false, format!("worker {worker} registered"))),
         Event::Submitted { job, extents, .. } => {
             Some((false, format!("job {job} begins, in {extents} extents")))
@@ -137,7 +111,7 @@ fn event_in_words(event: &Event) -> Option<(bool, String)> {
         Event::Placed { worker, task } => {
             Some((false, format!("{task}: worker {worker} holds the rows")))
         }
-        Event::Delivered { worker, task } => {
+        Event::Delivered { worker, task, .. } => {
             Some((false, format!("{task}: delivered by worker {worker}")))
         }
         Event::Failed {
@@ -156,6 +130,12 @@ fn command_in_words(command: &Command) -> Option<(bool, String)> {
         Command::Place { worker, task } => {
             Some((false, format!("{task}: its rows go to worker {worker}")))
         }
+        Command::Start {
+            worker,
+            task,
+            helps: Some(why),
+            ..
+        } => Some((false, format!("{task}: worker {worker} helps, {why}"))),
         Command::Start { worker, task, .. } => {
             Some((false, format!("{task}: given to worker {worker}")))
         }

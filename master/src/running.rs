@@ -6,14 +6,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use horma_core::{
-    Counters, Distribution, Extent, ExtentRecord, Handout, LostAttempt, Record, SubTrajectory,
-    Traffic, WorkerRecord,
+    Counters, Distribution, Extent, ExtentRecord, Handout, LostAttempt, Record, SecondAttempt,
+    Share, Stock, SubTrajectory, Traffic, WorkerRecord,
 };
 use horma_proto::{TaskId, Tls};
 use tokio::sync::oneshot;
 
 use crate::Progress;
-use crate::dispatch::Attempt;
+use crate::dispatch::{Attempt, Coming, needed};
 use crate::error::Result;
 use crate::place::{Placed, Placing};
 use crate::state::{Fault, Held};
@@ -25,6 +25,10 @@ pub(crate) struct RunningJob {
     pub begin: Instant,
     pub plan: Arc<Handout>,
     pub extents: Vec<Extent>,
+    /// What has come of each.
+    coming: Vec<Arc<Coming>>,
+    /// Rows that went with tasks, by extent.
+    rows_sent: BTreeMap<u32, u64>,
     /// How many extents need each row.
     users: Vec<u32>,
     pub progress: Progress,
@@ -37,10 +41,27 @@ pub(crate) struct RunningJob {
     /// What placing rows has taken so far, by extent.
     pub placed: BTreeMap<u32, Placed>,
     pub lost: Vec<LostAttempt>,
-    /// Calls under way: each ends when it is told why, or when the job is dropped.
-    pub calls: BTreeMap<TaskId, oneshot::Sender<String>>,
+    second: Vec<SecondAttempt>,
+    /// Calls under way.
+    pub calls: BTreeMap<TaskId, Call>,
+    /// Who made each attempt at each extent.
+    made_by: BTreeMap<(u32, u32), String>,
     workers: BTreeMap<String, String>,
     pub reply: Reply,
+}
+
+/// A call under way: it ends when it is told why, or when this is dropped.
+pub(crate) struct Call {
+    pub worker: String,
+    pub cut_off: oneshot::Sender<String>,
+    came: Arc<AtomicU64>,
+}
+
+impl Call {
+    /// Positions that have come by it.
+    pub fn came(&self) -> u64 {
+        self.came.load(Ordering::Relaxed)
+    }
 }
 
 impl RunningJob {
@@ -54,7 +75,9 @@ impl RunningJob {
         Self {
             begin: Instant::now(),
             plan,
+            coming: extents.iter().map(|e| Arc::new(Coming::of(e))).collect(),
             extents,
+            rows_sent: BTreeMap::new(),
             users,
             progress,
             arrived: Arc::default(),
@@ -62,6 +85,8 @@ impl RunningJob {
             kept: BTreeMap::new(),
             placed: BTreeMap::new(),
             lost: Vec::new(),
+            second: Vec::new(),
+            made_by: BTreeMap::new(),
             calls: BTreeMap::new(),
             workers: BTreeMap::new(),
             reply,
@@ -79,10 +104,36 @@ impl RunningJob {
 
     /// Writes down a call that begins; it ends early when it is told why, by what this returns.
     pub fn call(&mut self, task: TaskId, worker: &str, address: &str) -> oneshot::Receiver<String> {
-        let (call, cut_off) = oneshot::channel();
+        let (sender, cut_off) = oneshot::channel();
+        let call = Call {
+            worker: worker.to_owned(),
+            cut_off: sender,
+            came: Arc::default(),
+        };
         self.calls.insert(task, call);
         self.workers.insert(worker.to_owned(), address.to_owned());
+        self.made_by
+            .insert((task.extent, task.attempt), worker.to_owned());
         cut_off
+    }
+
+    /// How far the calls are: by whom, for what, how many positions have come by it, and how many of its
+    /// extent are missing.
+    pub fn progress(&self) -> Vec<(String, TaskId, u64, u64)> {
+        let far = |(&task, call): (&TaskId, &Call)| {
+            (
+                call.worker.clone(),
+                task,
+                call.came(),
+                self.left(task.extent),
+            )
+        };
+        self.calls.iter().map(far).collect()
+    }
+
+    /// How many positions of an extent have not come.
+    pub fn left(&self, extent: u32) -> u64 {
+        self.coming[extent as usize].received().left()
     }
 
     /// What placing an extent's own rows takes.
@@ -97,16 +148,36 @@ impl RunningJob {
         }
     }
 
-    /// What an attempt at an extent takes.
+    /// What an attempt at an extent takes, which is to bring what is missing; if it helps someone, why.
     pub fn attempt(
-        &self,
+        &mut self,
         task: TaskId,
         worker: &str,
         address: &str,
         holders: Vec<(Held, String)>,
+        helps: Option<String>,
         tls: Option<Tls>,
     ) -> Attempt {
         let extent = self.extents[task.extent as usize].clone();
+        let coming = self.coming[task.extent as usize].clone();
+        let missing = coming.received().missing();
+        let runs = self.plan.runs_left(&extent, &missing, helps.is_some());
+        let rows = match (&self.plan.stock, &holders[..]) {
+            (Stock::Rows(_), []) => needed(&runs),
+            (Stock::Rows(_), _) | (Stock::Grids(_), _) => Vec::new(),
+        };
+        *self.rows_sent.entry(task.extent).or_default() += rows.len() as u64;
+        if let Some(reason) = helps {
+            self.second.push(SecondAttempt {
+                extent: task.extent,
+                attempt: task.attempt,
+                worker: worker.to_owned(),
+                positions: missing.iter().map(|gap| gap.end - gap.start).sum(),
+                rows_sent: rows.len() as u64,
+                reason,
+            });
+        }
+        let came = self.calls.get(&task).map(|call| call.came.clone());
         let shared = |row: &&u32| self.users[**row as usize] > 1;
         Attempt {
             task,
@@ -115,7 +186,11 @@ impl RunningJob {
             plan: self.plan.clone(),
             overlap_rows: extent.rows.iter().filter(shared).count() as u32,
             extent,
+            runs,
+            rows,
             holders,
+            coming,
+            came: came.unwrap_or_default(),
             arrived: self.arrived.clone(),
             inserted: self.inserted.clone(),
             progress: self.progress.clone(),
@@ -135,40 +210,60 @@ impl RunningJob {
         });
     }
 
+    /// Keeps an extent of which nothing is missing, with the record of the attempt that completed it.
+    pub fn keep(&mut self, extent: u32, mut record: ExtentRecord) {
+        let coming = &self.coming[extent as usize];
+        let received = std::mem::take(&mut *coming.received());
+        let share = |(attempt, positions)| Share {
+            attempt,
+            worker: self.made_by[&(extent, attempt)].clone(),
+            positions,
+        };
+        let placed = self.placed.get(&extent).copied().unwrap_or_default();
+        let with_tasks = self.rows_sent.get(&extent).copied().unwrap_or_default();
+        record.shares = received.shares().into_iter().map(share).collect();
+        record.counters = received.cost();
+        record.rows_sent = placed.rows + with_tasks;
+        record.bytes_sent = placed.bytes + coming.sent.load(Ordering::Relaxed);
+        record.bytes_received = coming.bytes.load(Ordering::Relaxed);
+        record.place_seconds = placed.seconds;
+        self.kept.insert(extent, (received.into_parts(), record));
+    }
+
     /// Positions that have arrived, and those inserted between them.
     pub fn so_far(&self) -> [u64; 2] {
         [&self.arrived, &self.inserted].map(|n| n.load(Ordering::Relaxed))
     }
 
-    /// What has travelled for what is kept, and for rows that are placed.
+    /// What has travelled so far. What workers got from each other is known once an extent is kept.
     pub fn traffic(&self) -> Traffic {
         let mut traffic = Traffic {
             rows_needed: self.users.iter().filter(|&&n| n > 0).count() as u64,
             ..Traffic::default()
         };
-        for (_, record) in self.kept.values() {
-            traffic.rows_sent += record.rows_sent;
-            traffic.bytes_to_workers += record.bytes_sent;
-            traffic.bytes_between_workers += record.bytes_fetched;
-            traffic.bytes_of_results += record.bytes_received;
-        }
-        for placed in self.placed.values() {
-            traffic.rows_sent += placed.rows;
-            traffic.bytes_to_workers += placed.bytes;
+        for (extent, coming) in (0..).zip(&self.coming) {
+            if let Some((_, record)) = self.kept.get(&extent) {
+                traffic.rows_sent += record.rows_sent;
+                traffic.bytes_to_workers += record.bytes_sent;
+                traffic.bytes_between_workers += record.bytes_fetched;
+                traffic.bytes_of_results += record.bytes_received;
+            } else {
+                let placed = self.placed.get(&extent).copied().unwrap_or_default();
+                let with_tasks = self.rows_sent.get(&extent).copied().unwrap_or_default();
+                traffic.rows_sent += placed.rows + with_tasks;
+                traffic.bytes_to_workers += placed.bytes + coming.sent.load(Ordering::Relaxed);
+                traffic.bytes_of_results += coming.bytes.load(Ordering::Relaxed);
+            }
         }
         traffic
     }
 
     /// Hands over what was kept.
     pub fn complete(self) {
-        let traffic = self.traffic();
         let mut counters = Counters::default();
+        let traffic = self.traffic();
         let (mut parts, mut extents) = (Vec::new(), Vec::new());
-        for (extent, (positions, mut record)) in self.kept {
-            let placed = self.placed.get(&extent).copied().unwrap_or_default();
-            record.rows_sent += placed.rows;
-            record.bytes_sent += placed.bytes;
-            record.place_seconds = placed.seconds;
+        for (positions, record) in self.kept.into_values() {
             counters += record.counters;
             parts.extend(positions);
             extents.push(record);
@@ -180,6 +275,7 @@ impl RunningJob {
             workers: self.workers.into_iter().map(worker).collect(),
             extents,
             lost: self.lost,
+            second: self.second,
             ..Record::default()
         };
         let _ = self.reply.send(Ok((parts, record)));

@@ -84,8 +84,10 @@ pub struct Extent {
     pub positions: u64,
     /// How far it has come.
     pub state: ExtentState,
-    /// Who has it, or had it when it was done.
-    pub worker: Option<String>,
+    /// Of which so many have arrived.
+    pub arrived: u64,
+    /// Who is at it, or completed it.
+    pub workers: Vec<String>,
     /// The number of its last attempt.
     pub attempt: u32,
 }
@@ -103,9 +105,9 @@ pub struct Worker {
     pub state: WorkerState,
     /// The job and the extent that it is busy with.
     pub task: Option<[u64; 2]>,
-    /// Positions that it has delivered.
+    /// Positions that it has brought.
     pub positions: u64,
-    /// Positions per second of the tasks that it has delivered.
+    /// Positions per second that it was busy.
     pub rate: Option<f64>,
 }
 
@@ -129,21 +131,21 @@ pub(crate) fn snapshot(
     history: &History,
     now: Duration,
 ) -> Snapshot {
-    let worker = |member: Member<'_>| {
-        let done = history.done_by(member.name);
-        Worker {
-            worker: member.name.to_owned(),
-            address: addresses.get(member.name).cloned().unwrap_or_default(),
-            silent: member.silent.as_secs_f64(),
-            state: match member.task {
-                None => WorkerState::Idle,
-                Some((_, Step::Place)) => WorkerState::Placing,
-                Some((_, Step::Digitize)) => WorkerState::Digitizing,
-            },
-            task: member.task.map(|(t, _)| [t.job, u64::from(t.extent)]),
-            positions: done.positions,
-            rate: (done.seconds > 0.0).then(|| done.positions as f64 / done.seconds),
-        }
+    let worker = |member: Member<'_>| Worker {
+        worker: member.name.to_owned(),
+        address: addresses.get(member.name).cloned().unwrap_or_default(),
+        silent: member.silent.as_secs_f64(),
+        state: match member.task {
+            None => WorkerState::Idle,
+            Some((_, Step::Place)) => WorkerState::Placing,
+            Some((_, Step::Digitize)) => WorkerState::Digitizing,
+        },
+        task: member.task.map(|(t, _)| [t.job, u64::from(t.extent)]),
+        positions: member.positions,
+        rate: member
+            .cost
+            .filter(|&cost| cost > 0.0)
+            .map(|cost| 1.0 / cost),
     };
     Snapshot {
         version: horma_proto::VERSION,
@@ -166,7 +168,9 @@ fn going_on(state: &State, id: u64, job: &RunningJob) -> Job {
         .members(Duration::ZERO)
         .filter_map(|m| Some((m.task?.0, m.name)));
     for (task, name) in busy.filter(|(task, _)| task.job == id) {
-        seen.extents[task.extent as usize].worker = Some(name.to_owned());
+        seen.extents[task.extent as usize]
+            .workers
+            .push(name.to_owned());
         seen.state = JobState::Running;
     }
     if seen.arrived > 0 {
@@ -200,7 +204,11 @@ fn whole(id: u64, job: &RunningJob, state: JobState) -> Job {
             x: [extent.first, last].map(|i| job.plan.trajectory.travel(i)),
             positions: extent.count,
             state: kept.map_or(ExtentState::Waiting, |_| ExtentState::Done),
-            worker: kept.map(|record| record.worker.clone()),
+            arrived: extent.count.saturating_sub(job.left(number)),
+            workers: kept
+                .map(|record| record.worker.clone())
+                .into_iter()
+                .collect(),
             attempt: kept.map_or(0, |record| record.attempt),
         }
     });

@@ -7,9 +7,14 @@
 //! Rows either travel with the task, or they are placed first: each extent's own rows go to one
 //! worker, its holder, which serves them to others and digitizes the extent once all that it needs are
 //! placed. Placing comes before digitizing, so nobody waits for rows that nobody is going to have.
+//!
+//! An extent may be with two workers: an idle one helps a late one, and it is done when both together
+//! have brought all of it.
 
 mod assign;
+mod help;
 mod lose;
+mod pace;
 mod view;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,7 +23,9 @@ use std::time::Duration;
 use horma_proto::TaskId;
 
 use self::assign::assign;
+use self::help::help;
 use self::lose::{gone, lose};
+use self::pace::Pace;
 pub use self::view::ExtentState;
 pub(crate) use self::view::Member;
 use crate::error::Error;
@@ -45,6 +52,7 @@ struct Worker {
     incarnation: u64,
     seen: Duration,
     task: Option<(TaskId, Step)>,
+    pace: Pace,
 }
 
 /// What a worker is busy with.
@@ -128,8 +136,20 @@ pub(crate) enum Event {
     Cancelled { job: u64 },
     /// A worker holds an extent's rows.
     Placed { worker: String, task: TaskId },
-    /// A worker delivered all of a task.
-    Delivered { worker: String, task: TaskId },
+    /// So many positions of a task have come, and so many of its extent are missing.
+    Progress {
+        worker: String,
+        task: TaskId,
+        came: u64,
+        left: u64,
+    },
+    /// A worker did all of a task, or all that nobody else had done of it. So many positions of its
+    /// extent are missing all the same: others were to bring them, and failed.
+    Delivered {
+        worker: String,
+        task: TaskId,
+        left: u64,
+    },
     /// A worker did not deliver a task, or did not take its rows.
     Failed {
         worker: String,
@@ -149,6 +169,8 @@ pub(crate) enum Fault {
     /// The worker could not get rows from the one that holds them: the fault of that one, or of the
     /// way there.
     Halo { source: TaskId, reason: String },
+    /// An earlier attempt at the same extent brought other positions.
+    Different { attempt: u32 },
 }
 
 impl std::fmt::Display for Fault {
@@ -157,6 +179,7 @@ impl std::fmt::Display for Fault {
             Self::Lost(reason) => write!(f, "lost: {reason}"),
             Self::Wrong(reason) => write!(f, "wrong: {reason}"),
             Self::Halo { source, reason } => write!(f, "halo of {source} lost: {reason}"),
+            Self::Different { attempt } => write!(f, "different from attempt {attempt}"),
         }
     }
 }
@@ -167,15 +190,16 @@ pub(crate) enum Command {
     /// Bring an extent's own rows to this worker.
     Place { worker: String, task: TaskId },
     /// Bring this task to this worker. Unless rows travel with it, the worker holds the first of
-    /// these, and gets the others from those who do.
+    /// these, and gets the others from those who do. If it helps someone, this says why.
     Start {
         worker: String,
         task: TaskId,
         rows: Vec<Held>,
+        helps: Option<String>,
     },
     /// Nobody waits for this task any more.
     Abort { task: TaskId, reason: String },
-    /// The delivered positions are the extent's: keep them.
+    /// The extent's positions are all there, by this task at last: keep them.
     Keep { task: TaskId },
     /// All extents of the job are kept.
     Complete { job: u64 },
@@ -202,11 +226,6 @@ impl State {
     /// Whether this start of this worker has answered wrongly before.
     pub fn distrusts(&self, worker: &str, incarnation: u64) -> bool {
         self.distrusted.get(worker) == Some(&incarnation)
-    }
-
-    /// Whether any start of this worker is a member.
-    pub fn has(&self, worker: &str) -> bool {
-        self.workers.contains_key(worker)
     }
 
     /// Number of workers.
@@ -260,11 +279,21 @@ pub(crate) fn apply(state: &mut State, now: Duration, event: Event) -> Vec<Comma
                 extent.rows = Rows::Held(Held { id: task, worker });
             }
         }
-        Event::Delivered { worker, task } => {
+        Event::Progress {
+            worker,
+            task,
+            came,
+            left,
+        } => {
+            if let Some(worker) = state.workers.get_mut(&worker)
+                && worker.task == Some((task, Step::Digitize))
+            {
+                worker.pace.note(now, came, left);
+            }
+        }
+        Event::Delivered { worker, task, left } => {
             if free(state, &worker, task, Step::Digitize) {
-                set(state, task, Status::Done);
-                commands.push(Command::Keep { task });
-                complete(state, task.job, &mut commands);
+                deliver(state, &worker, task, left, &mut commands);
             }
         }
         Event::Failed {
@@ -279,7 +308,8 @@ pub(crate) fn apply(state: &mut State, now: Duration, event: Event) -> Vec<Comma
         }
     }
     desert(state, now, &mut commands);
-    assign(state, &mut commands);
+    assign(state, now, &mut commands);
+    help(state, now, &mut commands);
     commands
 }
 
@@ -304,6 +334,7 @@ fn register(
         incarnation,
         seen: now,
         task: None,
+        pace: Pace::default(),
     };
     if let Some(before) = state.workers.insert(name.to_owned(), worker) {
         let reason = format!("worker {name} started anew");
@@ -349,10 +380,41 @@ fn extent(state: &mut State, task: TaskId) -> Option<&mut Extent> {
     extents.get_mut(task.extent as usize)
 }
 
-fn set(state: &mut State, task: TaskId, to: Status) {
-    if let Some(extent) = extent(state, task) {
-        extent.status = to;
+/// Whether someone digitizes this extent.
+fn runs(state: &State, task: TaskId) -> bool {
+    let same = |(t, step): (TaskId, Step)| {
+        (t.job, t.extent, step) == (task.job, task.extent, Step::Digitize)
+    };
+    state.workers.values().any(|w| w.task.is_some_and(same))
+}
+
+/// An extent that somebody stopped at waits, unless another one is still at it.
+fn stopped(state: &mut State, task: TaskId) {
+    let runs = runs(state, task);
+    if let Some(extent) = extent(state, task)
+        && extent.status != Status::Done
+    {
+        extent.status = if runs {
+            Status::Running
+        } else {
+            Status::Waiting
+        };
     }
+}
+
+/// A worker is through with a task: if nothing is missing, so is everybody who was at the extent.
+fn deliver(state: &mut State, worker: &str, task: TaskId, left: u64, commands: &mut Vec<Command>) {
+    if left > 0 {
+        return stopped(state, task);
+    }
+    if let Some(extent) = extent(state, task) {
+        extent.status = Status::Done;
+    }
+    commands.push(Command::Keep { task });
+    let reason = format!("worker {worker} completed it");
+    let same = |t: &TaskId| (t.job, t.extent) == (task.job, task.extent);
+    take_off(state, same, Some(Step::Digitize), &reason, commands);
+    complete(state, task.job, commands);
 }
 
 fn fail(state: &mut State, job: u64, error: Error, commands: &mut Vec<Command>) {
@@ -364,8 +426,20 @@ fn fail(state: &mut State, job: u64, error: Error, commands: &mut Vec<Command>) 
 
 /// Takes every task of a job that is over off its worker.
 fn release(state: &mut State, job: u64, reason: &str, commands: &mut Vec<Command>) {
+    take_off(state, |t| t.job == job, None, reason, commands);
+}
+
+/// Takes tasks off their workers, all of them or those at one step.
+fn take_off(
+    state: &mut State,
+    which: impl Fn(&TaskId) -> bool,
+    step: Option<Step>,
+    reason: &str,
+    commands: &mut Vec<Command>,
+) {
     for worker in state.workers.values_mut() {
-        if let Some((task, _)) = worker.task.take_if(|(t, _)| t.job == job) {
+        let is_it = |(t, s): &mut (TaskId, Step)| which(t) && step.is_none_or(|step| step == *s);
+        if let Some((task, _)) = worker.task.take_if(is_it) {
             let reason = reason.to_owned();
             commands.push(Command::Abort { task, reason });
         }

@@ -121,7 +121,7 @@ pub const WORKERS: Metric = metric(
 pub const POSITIONS: Metric = metric(
     Kind::Counter,
     "horma_positions_total",
-    "positions that came in, without inserted ones; those of lost attempts count, and come again",
+    "positions that came in, without inserted ones; what two workers bring counts twice",
     None,
     MASTER,
 );
@@ -137,8 +137,8 @@ pub const DIGITIZED: Metric = metric(
 pub const ATTEMPTS_LOST: Metric = metric(
     Kind::Counter,
     "horma_attempts_lost_total",
-    "attempts at an extent that came to nothing: the worker was lost, it answered wrongly, or it could not get rows from another",
-    Some(("reason", &["lost", "wrong", "halo"])),
+    "attempts at an extent that came to nothing: the worker was lost, it answered wrongly, it could not get rows from another, or two brought different positions",
+    Some(("reason", &["lost", "wrong", "halo", "different"])),
     MASTER,
 );
 /// Where a master's time goes.

@@ -74,8 +74,6 @@ fn good() -> Vec<Vec<u8>> {
         }),
         job: Some(job),
         trajectory: Some(trajectory),
-        first: 90,
-        count: 90,
         runs: vec![wire::Run {
             first: 90,
             count: 90,

@@ -42,10 +42,10 @@ pub(crate) async fn keep(
         loop {
             let silence = match register(&mut client, config, address).await {
                 Ok((interval, master)) => {
-                    info!(master = config.master, "registered");
                     store.keep_master(master);
-                    pause = FIRST_PAUSE;
                     member(registered, true);
+                    info!(master = config.master, "registered");
+                    pause = FIRST_PAUSE;
                     let silence = heartbeats(&mut client, config, store, interval).await;
                     member(registered, false);
                     heard = Some(Instant::now());

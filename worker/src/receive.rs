@@ -152,15 +152,7 @@ struct Header {
 fn header_from_wire(header: wire::Task) -> Result<Header> {
     let job = header.job.ok_or(missing("a job"))?;
     let trajectory = horma_proto::trajectory_from_wire(header.trajectory.as_ref())?;
-    let end = header.first.checked_add(header.count);
-    let Some(end) = end.filter(|&end| end <= trajectory.positions) else {
-        return Err(Error::Incomplete {
-            what: "positions of a task",
-            expected: trajectory.positions,
-            found: end.unwrap_or(u64::MAX),
-        });
-    };
-    check_runs(&header.runs, header.first, end)?;
+    check_runs(&header.runs, trajectory.positions)?;
     let task = Task {
         id: header.id.try_into()?,
         job: horma_proto::job_from_wire(&job)?,
@@ -175,23 +167,23 @@ fn header_from_wire(header: wire::Task) -> Result<Header> {
     })
 }
 
-/// The runs of a task must make up its positions.
-fn check_runs(runs: &[Run], first: u64, end: u64) -> Result<()> {
-    let mut order: Vec<(u64, u64)> = runs.iter().map(|r| (r.first, r.count)).collect();
-    order.sort_unstable();
-    let mut next = Some(first);
-    for (begin, count) in order {
-        let follows = next.filter(|&next| next == begin);
-        next = follows.and_then(|next| next.checked_add(count));
+/// The runs of a task must be of the trajectory's positions, and have none of them twice.
+fn check_runs(runs: &[Run], positions: u64) -> Result<()> {
+    let mut order: Vec<&Run> = runs.iter().collect();
+    order.sort_unstable_by_key(|run| run.first);
+    let mut next = 0;
+    for run in order {
+        let end = run.first.checked_add(run.count);
+        let end = end.filter(|&end| next <= run.first && run.first < end && end <= positions);
+        let Some(end) = end else {
+            let Run { first, count, .. } = run;
+            let why =
+                format!("a run of {count} positions from {first} on, of {positions}, after {next}");
+            return Err(Error::Malformed(why));
+        };
+        next = end;
     }
-    if next == Some(end) {
-        return Ok(());
-    }
-    Err(Error::Incomplete {
-        what: "positions of a task's runs",
-        expected: end - first,
-        found: runs.iter().fold(0, |sum, r| r.count.saturating_add(sum)),
-    })
+    Ok(())
 }
 
 fn holdings_from_wire(holdings: wire::Holdings) -> Result<Supply> {
@@ -218,7 +210,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn runs_must_make_up_the_task() {
+    fn runs_have_each_position_once() {
         let run = |(first, count)| Run {
             first,
             count,
@@ -226,18 +218,18 @@ mod tests {
         };
         let check = |runs: &[(u64, u64)]| {
             let runs: Vec<Run> = runs.iter().copied().map(run).collect();
-            check_runs(&runs, 10, 20).is_ok()
+            check_runs(&runs, 20).is_ok()
         };
-        assert!(check(&[(10, 10)]));
+        assert!(check(&[(0, 20)]));
         assert!(check(&[(13, 4), (10, 3), (17, 3)]));
+        assert!(check(&[(10, 5), (2, 6)]));
         for bad in [
-            &[(10, 9)][..],
-            &[(10, 11)],
-            &[(11, 9)],
+            &[(10, 11)][..],
+            &[(10, 0)],
+            &[(20, 1)],
             &[(10, 5), (14, 6)],
-            &[(10, 5), (16, 4)],
+            &[(10, 5), (10, 5)],
             &[(10, 10), (20, u64::MAX)],
-            &[],
         ] {
             assert!(!check(bad), "{bad:?}");
         }

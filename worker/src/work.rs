@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use horma_core::{Counters, Digitizer, Row, Simd};
+use horma_core::{Digitizer, Row, Simd};
 use horma_proto::metrics::{DIGITIZED, EVALUATIONS, NODES, TASK_SECONDS, TASKS};
 use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::{self, DigitizeReply, HaloLost, Run, Span};
@@ -100,6 +100,7 @@ fn reply(id: TaskId, kind: Reply) -> DigitizeReply {
     DigitizeReply {
         id: Some(id.into()),
         kind: Some(kind),
+        counters: None,
     }
 }
 
@@ -111,7 +112,6 @@ async fn digitize(task: Task, means: &Means, replies: &Replies) -> Result<wire::
     let begin = Instant::now();
     let (mut rows, mut halo) = at_hand(task.supply, task.id, means).await?;
     finished.make_seconds = begin.elapsed().as_secs_f64();
-    let mut counters = Counters::default();
     for run in task.runs {
         if let Some(mut coming) = halo.take_if(|_| !all_there(&rows, &run.rows)) {
             let begin = Instant::now();
@@ -146,13 +146,9 @@ async fn digitize(task: Task, means: &Means, replies: &Replies) -> Result<wire::
         let done = tokio::task::spawn_blocking(move || pool.install(|| job.run())).await;
         let done = done.map_err(|_| Status::internal("digitizing panicked"))?;
         let cost = done.ok_or(Failure::Abandoned)?;
-        counters += cost.counters;
-        EVALUATIONS.add("", cost.counters.evaluations);
-        NODES.add("", cost.counters.nodes);
         finished.build_seconds += cost.build_seconds;
         finished.digitize_seconds += cost.digitize_seconds;
     }
-    finished.counters = Some(horma_proto::counters_to_wire(counters));
     Ok(finished)
 }
 
@@ -238,7 +234,6 @@ struct Digitizing {
 
 /// What a run took.
 struct Cost {
-    counters: Counters,
     build_seconds: f64,
     digitize_seconds: f64,
 }
@@ -258,20 +253,24 @@ impl Digitizing {
         let begin = Instant::now();
         let mut abandoned = false;
         let positions = run.first..run.first + run.count;
-        let counters = digitizer.run_chunks(&self.trajectory, positions, |run| {
+        digitizer.run_chunks(&self.trajectory, positions, |run, cost| {
             let (first, count) = (run.first, run.touches.len());
             DIGITIZED.add("", count as u64);
+            EVALUATIONS.add("", cost.evaluations);
+            NODES.add("", cost.nodes);
             debug!(%id, first, count, between = run.between.len(), "positions");
             let mut messages = horma_proto::position_chunks(first, &run.touches, &run.between);
+            // The first message of a chunk has what all of it cost.
+            let mut cost = Some(horma_proto::counters_to_wire(cost));
             let sent = messages.all(|m| {
-                let message = reply(id, Reply::Positions(m));
+                let mut message = reply(id, Reply::Positions(m));
+                message.counters = cost.take();
                 !self.shutdown.is_cancelled() && self.replies.blocking_send(Ok(message)).is_ok()
             });
             abandoned = !sent;
             sent
         });
         (!abandoned).then(|| Cost {
-            counters,
             build_seconds,
             digitize_seconds: begin.elapsed().as_secs_f64(),
         })

@@ -121,7 +121,7 @@ impl<'a> Walk<'a> {
     pub fn time(&self) -> f64 {
         let begin = Instant::now();
         for run in &self.runs {
-            let deliver = |run| {
+            let deliver = |run, _| {
                 black_box::<SubTrajectory>(run);
                 true
             };
@@ -136,7 +136,7 @@ impl<'a> Walk<'a> {
         let mut all = Vec::new();
         let mut counters = Counters::default();
         for run in &self.runs {
-            let deliver = |run: SubTrajectory| {
+            let deliver = |run: SubTrajectory, _| {
                 all.extend(run.touches);
                 true
             };

@@ -149,7 +149,7 @@ fn run(
             ..SubTrajectory::default()
         };
         let digitizer = Digitizer::new(&job, rows, simd);
-        let counters = digitizer.run_chunks(&plan.trajectory, positions, |chunk| {
+        let counters = digitizer.run_chunks(&plan.trajectory, positions, |chunk, _| {
             assert_eq!(chunk.first, path.end());
             path.touches.extend(chunk.touches);
             path.between.extend(chunk.between);

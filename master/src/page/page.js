@@ -133,7 +133,8 @@ function updateStrip(card, { extents }) {
     return item;
   }, (item, extent) => {
     const button = item.firstElementChild;
-    const by = extent.worker === null ? "" : ` ${extent.state === "done" ? "by" : "on"} ${extent.worker}`;
+    const workers = extent.workers.join(" and ");
+    const by = workers && ` ${extent.state === "done" ? "by" : "on"} ${workers}`;
     const again = extent.attempt > 1 ? `, attempt ${extent.attempt}` : "";
     const words = `Extent ${extent.extent}, ${mm(extent.x[0])} to ${mm(extent.x[1])}, ` +
       `${count.format(extent.positions)} positions, ${extent.state}${by}${again}`;
@@ -142,7 +143,7 @@ function updateStrip(card, { extents }) {
     button.dataset.state = extent.state;
     button.style.left = `${share(extent.x[0])}%`;
     button.style.width = `${share(extent.end) - share(extent.x[0])}%`;
-    button.style.setProperty("--hue", extent.worker === null ? 0 : hue(extent.worker));
+    button.style.setProperty("--hue", workers ? hue(extent.workers[0]) : 0);
     if (card.selected === button) select(card, button);
   });
 }

@@ -1,29 +1,32 @@
-//! Who does what next: idle workers are given what waits, oldest job first, lowest extent first.
+//! Who does what next: idle workers are given what waits, oldest job first, lowest extent first. Who has
+//! been faster so far comes first, and holds more rows.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
 use horma_proto::TaskId;
 
-use super::{Command, Extent, Held, Rows, State, Status, Step};
+use super::pace::costs;
+use super::{Command, Extent, Held, Rows, State, Status, Step, Worker};
 
 /// Gives what waits to idle workers: rows to be placed first, for others may need them.
-pub(super) fn assign(state: &mut State, commands: &mut Vec<Command>) {
-    let members: Vec<String> = state.workers.keys().cloned().collect();
+pub(super) fn assign(state: &mut State, now: Duration, commands: &mut Vec<Command>) {
+    let members = costs(&state.workers);
     let mut idle: BTreeSet<&String> = members
-        .iter()
+        .keys()
         .filter(|name| state.workers[*name].task.is_none())
         .collect();
     for (&job, extents) in &mut state.jobs {
         if idle.is_empty() {
             return;
         }
-        let mut given = place(job, extents, &members, &mut idle);
+        let mut given = place(job, extents, &state.workers, &members, &mut idle);
         given.extend(start(job, extents, &members, &mut idle));
         for (step, command) in given {
             if let Command::Place { worker, task } | Command::Start { worker, task, .. } = &command
                 && let Some(worker) = state.workers.get_mut(worker)
             {
-                worker.task = Some((*task, step));
+                worker.take(now, *task, step);
             }
             commands.push(command);
         }
@@ -34,15 +37,27 @@ pub(super) fn assign(state: &mut State, commands: &mut Vec<Command>) {
 fn place(
     job: u64,
     extents: &mut [Extent],
-    members: &[String],
+    workers: &BTreeMap<String, Worker>,
+    members: &BTreeMap<String, f64>,
     idle: &mut BTreeSet<&String>,
 ) -> Vec<(Step, Command)> {
     if extents.iter().all(|e| e.rows != Rows::Nowhere) {
         return Vec::new();
     }
-    let mut load: BTreeMap<String, u32> = BTreeMap::new();
+    let mut load: BTreeMap<&String, u32> = BTreeMap::new();
     for held in extents.iter().filter_map(Extent::held) {
-        *load.entry(held.worker.clone()).or_default() += 1;
+        if let Some((name, _)) = members.get_key_value(&held.worker) {
+            *load.entry(name).or_default() += 1;
+        }
+    }
+    // Those who are about to hold some are as good as idle ones: what is theirs is not for slower ones.
+    let mut taking = BTreeSet::new();
+    for name in members.keys() {
+        let places = |(t, step): &(TaskId, Step)| (t.job, *step) == (job, Step::Place);
+        if workers[name].task.as_ref().is_some_and(places) {
+            *load.entry(name).or_default() += 1;
+            taking.insert(name);
+        }
     }
     let wanted = wanted(extents);
     let mut given = Vec::new();
@@ -50,15 +65,21 @@ fn place(
         if !wanted || extent.rows != Rows::Nowhere {
             continue;
         }
-        let held_by = |name: &String| load.get(name).copied().unwrap_or_default();
-        let Some(worker) = choose(extent, members, idle, held_by) else {
+        let after = |name: &String| f64::from(1 + load.get(name).copied().unwrap_or_default());
+        let may = idle.union(&taking).copied();
+        let Some(worker) = choose(extent, members, may, idle, after) else {
             continue;
         };
-        *load.entry(worker.clone()).or_default() += 1;
+        if !idle.remove(worker) {
+            continue;
+        }
+        taking.insert(worker);
+        *load.entry(worker).or_default() += 1;
         extent.attempts += 1;
         extent.only_placed = true;
         extent.rows = Rows::OnTheWay;
         let task = task(job, number, extent);
+        let worker = worker.clone();
         given.push((Step::Place, Command::Place { worker, task }));
     }
     given
@@ -69,7 +90,7 @@ fn place(
 fn start(
     job: u64,
     extents: &mut [Extent],
-    members: &[String],
+    members: &BTreeMap<String, f64>,
     idle: &mut BTreeSet<&String>,
 ) -> Vec<(Step, Command)> {
     let mut given = Vec::new();
@@ -81,27 +102,33 @@ fn start(
             continue;
         }
         let (worker, rows) = match &extents[i].rows {
-            Rows::WithTask => match choose(&extents[i], members, idle, |_| 0) {
-                Some(worker) => (worker, Vec::new()),
-                None => continue,
-            },
-            Rows::Held(own) if idle.contains(&own.worker) => match needed(extents, i, own) {
-                Some(rows) => {
-                    let worker = own.worker.clone();
-                    idle.remove(&worker);
-                    (worker, rows)
+            Rows::WithTask => {
+                let may = idle.iter().copied();
+                match choose(&extents[i], members, may, idle, |_| 1.0) {
+                    Some(worker) => (worker.clone(), Vec::new()),
+                    None => continue,
                 }
+            }
+            Rows::Held(own) if idle.contains(&own.worker) => match needed(extents, i, own) {
+                Some(rows) => (own.worker.clone(), rows),
                 None => continue,
             },
             Rows::Nowhere | Rows::OnTheWay | Rows::Held(_) => continue,
         };
+        idle.remove(&worker);
         let extent = &mut extents[i];
         if !std::mem::take(&mut extent.only_placed) {
             extent.attempts += 1;
         }
         extent.status = Status::Running;
         let task = task(job, i as u32, extent);
-        given.push((Step::Digitize, Command::Start { worker, task, rows }));
+        let start = Command::Start {
+            worker,
+            task,
+            rows,
+            helps: None,
+        };
+        given.push((Step::Digitize, start));
     }
     given
 }
@@ -125,27 +152,38 @@ pub(super) fn needed(extents: &[Extent], of: usize, own: &Held) -> Option<Vec<He
     all.map(Option::<&Held>::cloned).collect()
 }
 
-/// Takes the idle worker with the least load, and one that has failed the extent only if every member
-/// has.
-fn choose(
+/// Whoever would be through first with so much of a load, an idle one if there are several; one that
+/// has failed the extent only if every member has.
+fn choose<'a>(
     extent: &Extent,
-    members: &[String],
-    idle: &mut BTreeSet<&String>,
-    load: impl Fn(&String) -> u32,
-) -> Option<String> {
+    members: &BTreeMap<String, f64>,
+    may: impl Iterator<Item = &'a String>,
+    idle: &BTreeSet<&String>,
+    load: impl Fn(&String) -> f64,
+) -> Option<&'a String> {
     let tried = |name: &String| extent.failed_by.contains(name);
-    let anyone = members.iter().all(tried);
-    let may = idle.iter().copied().filter(|name| anyone || !tried(name));
-    let chosen = may.min_by_key(|name| load(name))?;
-    idle.remove(chosen);
-    Some(chosen.clone())
+    let anyone = members.keys().all(tried);
+    let may = may.filter(|name| anyone || !tried(name));
+    let through = |name: &String| load(name) * members[name];
+    may.min_by(|a, b| {
+        let order = through(a).total_cmp(&through(b));
+        order.then(idle.contains(b).cmp(&idle.contains(a)))
+    })
 }
 
-fn task(job: u64, extent: u32, of: &Extent) -> TaskId {
+pub(super) fn task(job: u64, extent: u32, of: &Extent) -> TaskId {
     TaskId {
         job,
         extent,
         attempt: of.attempts,
+    }
+}
+
+impl Worker {
+    /// It is given something to do.
+    pub(super) fn take(&mut self, now: Duration, task: TaskId, step: Step) {
+        self.task = Some((task, step));
+        self.pace.begin(now);
     }
 }
 

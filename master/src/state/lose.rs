@@ -2,7 +2,7 @@
 
 use horma_proto::TaskId;
 
-use super::{Command, Fault, MAX_ATTEMPTS, Rows, State, Status, Step, Worker, extent, fail, set};
+use super::{Command, Fault, MAX_ATTEMPTS, Rows, State, Step, Worker, extent, fail, runs, stopped};
 use crate::error::Error;
 
 /// A worker failed a task: it leaves, and the extent waits for another. One that is merely cut off
@@ -18,8 +18,18 @@ pub(super) fn lose(
     let reason = match fault {
         Fault::Lost(reason) => format!("worker {name} was lost ({reason})"),
         Fault::Wrong(reason) => format!("worker {name} answered wrongly ({reason})"),
+        Fault::Different { attempt } => {
+            let attempts = (attempt, task.attempt);
+            let extent = task.extent;
+            return fail(
+                state,
+                task.job,
+                Error::Different { extent, attempts },
+                commands,
+            );
+        }
         Fault::Halo { source, reason } => {
-            set(state, task, Status::Waiting);
+            stopped(state, task);
             return lose_rows(state, name, source, &reason, commands);
         }
     };
@@ -59,14 +69,14 @@ fn lose_rows(
         worker.task.take_if(same)
     });
     if let Some((task, _)) = running {
-        set(state, task, Status::Waiting);
+        stopped(state, task);
         let reason = reason.clone();
         commands.push(Command::Abort { task, reason });
     }
     retry(state, &holder, source, Step::Place, reason, commands);
 }
 
-/// Puts an extent back, unless everybody has tried it, and that too often.
+/// Puts an extent back, unless everybody has tried it, and that too often, and nobody is at it.
 fn retry(
     state: &mut State,
     worker: &str,
@@ -75,19 +85,22 @@ fn retry(
     last: String,
     commands: &mut Vec<Command>,
 ) {
+    if step == Step::Digitize {
+        stopped(state, task);
+    }
+    let runs = runs(state, task);
     let Some(extents) = state.jobs.get_mut(&task.job) else {
         return;
     };
     let extent = &mut extents[task.extent as usize];
-    match step {
-        Step::Place => extent.rows = Rows::Nowhere,
-        Step::Digitize => extent.status = Status::Waiting,
+    if step == Step::Place {
+        extent.rows = Rows::Nowhere;
     }
     extent.failures += 1;
     extent.failed_by.insert(worker.to_owned());
     let attempts = extent.failures;
     let someone_else = state.workers.keys().any(|w| !extent.failed_by.contains(w));
-    if attempts >= MAX_ATTEMPTS && !someone_else {
+    if attempts >= MAX_ATTEMPTS && !someone_else && !runs {
         let error = Error::TooManyAttempts {
             extent: task.extent,
             attempts,

@@ -4,13 +4,13 @@ use super::*;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 
-const LEASE: Duration = Duration::from_secs(10);
+pub(super) const LEASE: Duration = Duration::from_secs(10);
 
 fn name(worker: u8) -> String {
     format!("w{worker}")
 }
 
-fn submitted(job: u64, extents: u32) -> Event {
+pub(super) fn submitted(job: u64, extents: u32) -> Event {
     Event::Submitted {
         job,
         extents,
@@ -19,7 +19,7 @@ fn submitted(job: u64, extents: u32) -> Event {
 }
 
 /// Extents of which each needs the rows of those up to `reach` away.
-fn neighbours(extents: u32, reach: u32) -> Vec<Vec<u32>> {
+pub(super) fn neighbours(extents: u32, reach: u32) -> Vec<Vec<u32>> {
     let near = |i: u32| (0..extents).filter(move |&j| i != j && i.abs_diff(j) <= reach);
     (0..extents).map(|i| near(i).collect()).collect()
 }
@@ -33,7 +33,9 @@ enum Happens {
     /// So many extents, and how far they reach if their rows are placed.
     Submit(u32, Option<u32>),
     Cancel(u64),
-    Deliver(usize),
+    /// So many of the extent's positions are missing all the same.
+    Deliver(usize, u64),
+    Progress(usize, u64, u64),
     Fail(usize, u8),
 }
 
@@ -44,29 +46,35 @@ fn steps() -> impl Strategy<Value = Vec<Happens>> {
         1 => (0..12u64).prop_map(Happens::Wait),
         2 => (0..6u32, prop::option::of(0..3u32)).prop_map(|(n, reach)| Happens::Submit(n, reach)),
         1 => (0..4u64).prop_map(Happens::Cancel),
-        6 => (0..8usize).prop_map(Happens::Deliver),
-        3 => (0..8usize, 0..6u8).prop_map(|(t, how)| Happens::Fail(t, how)),
+        6 => (0..8usize, prop_oneof![4 => Just(0), 1 => 1..5u64])
+            .prop_map(|(t, left)| Happens::Deliver(t, left)),
+        4 => (0..8usize, 0..1000u64, 0..1000u64)
+            .prop_map(|(t, came, left)| Happens::Progress(t, came, left)),
+        3 => (0..8usize, 0..7u8).prop_map(|(t, how)| Happens::Fail(t, how)),
     ];
     prop::collection::vec(step, 1..120)
 }
 
 /// Holds after every event.
 fn check(state: &State) {
-    let mut running = BTreeSet::new();
+    let mut running: BTreeMap<(u64, u32), BTreeSet<u32>> = BTreeMap::new();
     let mut placing = BTreeSet::new();
     for worker in state.workers.values() {
         if let Some((task, step)) = worker.task {
             let extent = &state.jobs[&task.job][task.extent as usize];
-            assert_eq!(extent.attempts, task.attempt);
-            let (set, what) = match step {
-                Step::Place => (&mut placing, extent.rows == Rows::OnTheWay),
-                Step::Digitize => (&mut running, extent.status == Status::Running),
-            };
-            assert!(what, "{step:?} {extent:?}");
-            assert!(
-                set.insert((task.job, task.extent)),
-                "two workers, one extent"
-            );
+            assert!((1..=extent.attempts).contains(&task.attempt));
+            match step {
+                Step::Place => {
+                    assert_eq!(extent.rows, Rows::OnTheWay);
+                    assert!(placing.insert((task.job, task.extent)), "two take its rows");
+                }
+                Step::Digitize => {
+                    assert_eq!(extent.status, Status::Running);
+                    let at = running.entry((task.job, task.extent)).or_default();
+                    assert!(at.insert(task.attempt), "two workers, one attempt");
+                    assert!(at.len() <= 2, "three workers, one extent");
+                }
+            }
         }
     }
     for (&job, extents) in &state.jobs {
@@ -78,7 +86,7 @@ fn check(state: &State) {
             let is = |status| extent.status == status;
             assert_eq!(
                 is(Status::Running),
-                running.contains(&(job, i)),
+                running.contains_key(&(job, i)),
                 "running means someone runs it"
             );
             assert_eq!(
@@ -110,7 +118,12 @@ fn check(state: &State) {
                     false
                 }
             };
-            assert!(!(waits && idle), "nobody idles while an extent waits");
+            // Rows may be meant for a faster one that is about to take others.
+            let meant = extent.rows == Rows::Nowhere && placing.iter().any(|(j, _)| *j == job);
+            assert!(
+                !(waits && idle) || meant,
+                "nobody idles while an extent waits"
+            );
         }
     }
 }
@@ -152,9 +165,15 @@ proptest! {
                     Event::Cancelled { job }
                 }
                 // Late and repeated answers are as likely as current ones.
-                Happens::Deliver(i) => match pick(i) {
+                Happens::Deliver(i, left) => match pick(i) {
                     Some((worker, task, Step::Place, _)) => Event::Placed { worker, task },
-                    Some((worker, task, Step::Digitize, _)) => Event::Delivered { worker, task },
+                    Some((worker, task, Step::Digitize, _)) => {
+                        Event::Delivered { worker, task, left }
+                    }
+                    None => Event::Tick,
+                },
+                Happens::Progress(i, came, left) => match pick(i) {
+                    Some((worker, task, ..)) => Event::Progress { worker, task, came, left },
                     None => Event::Tick,
                 },
                 Happens::Fail(i, how) => match pick(i) {
@@ -162,6 +181,7 @@ proptest! {
                         let reason = "of the test".to_owned();
                         let fault = match (how, rows.last()) {
                             (0, _) => Fault::Wrong(reason),
+                            (6, _) => Fault::Different { attempt: 1 },
                             (1..4, Some(held)) => Fault::Halo { source: held.id, reason },
                             _ => Fault::Lost(reason),
                         };
@@ -176,7 +196,8 @@ proptest! {
                         prop_assert!(state.workers.contains_key(&worker) || ended.contains(&task.job));
                         started.push((worker, task, Step::Place, Vec::new()));
                     }
-                    Command::Start { worker, task, rows } => {
+                    Command::Start { worker, task, rows, helps } => {
+                        prop_assert!(helps.is_none() || rows.is_empty());
                         prop_assert!(state.workers.contains_key(&worker) || ended.contains(&task.job));
                         if let Some(own) = rows.first() {
                             prop_assert_eq!(&own.worker, &worker);
@@ -196,10 +217,12 @@ proptest! {
                     }
                     Command::Fail { job, error } => {
                         prop_assert!(ended.insert(job), "ended twice");
-                        if let Error::TooManyAttempts { attempts, .. } = error {
-                            prop_assert!(attempts >= MAX_ATTEMPTS);
-                        } else {
-                            prop_assert!(state.workers.is_empty(), "someone is left");
+                        match error {
+                            Error::TooManyAttempts { attempts, .. } => {
+                                prop_assert!(attempts >= MAX_ATTEMPTS);
+                            }
+                            Error::Different { .. } => {}
+                            _ => prop_assert!(state.workers.is_empty(), "someone is left"),
                         }
                     }
                     Command::Abort { .. } => {}
@@ -258,6 +281,7 @@ fn a_lost_workers_extent_goes_to_another() {
     let delivered = |extent, attempt| Event::Delivered {
         worker: "b".to_owned(),
         task: task(extent, attempt),
+        left: 0,
     };
     let commands = apply(&mut state, now, delivered(1, 1));
     assert_eq!(starts(&commands), [("b", 0, 2)]);
@@ -334,6 +358,7 @@ fn a_worker_that_cannot_be_reached_does_not_fail_a_job() {
             extent: 1,
             attempt: 1,
         },
+        left: 0,
     };
     let commands = apply(&mut state, now, delivered);
     assert_eq!(starts(&commands), [("good", 0, 2)]);
@@ -392,7 +417,7 @@ fn a_worker_that_answered_wrongly_is_not_asked_again() {
 }
 
 /// The state with workers that are there, and a way to tell it what happens.
-fn with_workers(names: &[&str]) -> State {
+pub(super) fn with_workers(names: &[&str]) -> State {
     let mut state = State::new(LEASE, Duration::ZERO);
     for &name in names {
         let worker = name.to_owned();
@@ -406,18 +431,32 @@ fn with_workers(names: &[&str]) -> State {
     state
 }
 
-/// What is to be done, in short.
+/// What is to be done at once, in short.
 fn told(state: &mut State, event: Event) -> Vec<String> {
-    let commands = apply(state, Duration::ZERO, event);
+    told_at(0, state, event)
+}
+
+/// What is to be done after so many seconds, in short.
+pub(super) fn told_at(seconds: u64, state: &mut State, event: Event) -> Vec<String> {
+    let commands = apply(state, Duration::from_secs(seconds), event);
     let tell = |command| match command {
         Command::Place { worker, task } => {
             format!("place {}.{} on {worker}", task.extent, task.attempt)
         }
-        Command::Start { worker, task, rows } => {
+        Command::Start {
+            worker,
+            task,
+            rows,
+            helps,
+        } => {
+            let helps = helps.map_or(String::new(), |why| format!("; {why}"));
             let rows = rows.iter();
             let rows = rows.map(|h| format!("{}.{}@{}", h.id.extent, h.id.attempt, h.worker));
             let rows = rows.collect::<Vec<_>>().join(" ");
-            format!("start {}.{} on {worker}: {rows}", task.extent, task.attempt)
+            format!(
+                "start {}.{} on {worker}: {rows}{helps}",
+                task.extent, task.attempt
+            )
         }
         Command::Abort { task, .. } => format!("abort {}.{}", task.extent, task.attempt),
         Command::Keep { task } => format!("keep {}.{}", task.extent, task.attempt),
@@ -427,7 +466,7 @@ fn told(state: &mut State, event: Event) -> Vec<String> {
     commands.into_iter().map(tell).collect()
 }
 
-fn task(extent: u32, attempt: u32) -> TaskId {
+pub(super) fn task(extent: u32, attempt: u32) -> TaskId {
     let job = 1;
     TaskId {
         job,
@@ -436,7 +475,7 @@ fn task(extent: u32, attempt: u32) -> TaskId {
     }
 }
 
-fn halo_job(extents: u32) -> Event {
+pub(super) fn halo_job(extents: u32) -> Event {
     Event::Submitted {
         job: 1,
         extents,
@@ -444,16 +483,17 @@ fn halo_job(extents: u32) -> Event {
     }
 }
 
-fn placed(worker: &str, extent: u32, attempt: u32) -> Event {
+pub(super) fn placed(worker: &str, extent: u32, attempt: u32) -> Event {
     let worker = worker.to_owned();
     let task = task(extent, attempt);
     Event::Placed { worker, task }
 }
 
-fn delivered(worker: &str, extent: u32, attempt: u32) -> Event {
+pub(super) fn delivered(worker: &str, extent: u32, attempt: u32) -> Event {
     let worker = worker.to_owned();
     let task = task(extent, attempt);
-    Event::Delivered { worker, task }
+    let left = 0;
+    Event::Delivered { worker, task, left }
 }
 
 fn halo_lost(worker: &str, extent: u32, attempt: u32, source: TaskId) -> Event {

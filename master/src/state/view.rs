@@ -28,6 +28,10 @@ pub(crate) struct Member<'a> {
     pub name: &'a str,
     pub silent: Duration,
     pub task: Option<(TaskId, Step)>,
+    /// Positions that it has brought.
+    pub positions: u64,
+    /// Seconds that each took.
+    pub cost: Option<f64>,
 }
 
 impl State {
@@ -37,6 +41,8 @@ impl State {
             name,
             silent: now.saturating_sub(worker.seen),
             task: worker.task,
+            positions: worker.pace.positions(),
+            cost: worker.pace.cost(),
         })
     }
 
