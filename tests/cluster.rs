@@ -5,7 +5,7 @@ mod common;
 
 use std::path::Path;
 
-use common::{data, job, master, path_of, report, run, sample, scratch, succeed};
+use common::{Process, data, job, master, path_of, report, run, sample, scratch, succeed};
 use common::{text, texts, worker};
 use serde_json::Value;
 
@@ -321,4 +321,75 @@ fn a_cluster_made_by_hand_gives_the_same_bytes() {
         assert_eq!(workers, ["a", "b"]);
         check_traffic(distribution, &report);
     }
+}
+
+#[test]
+fn workers_find_their_master_by_a_file_and_again_when_it_came_back_elsewhere() {
+    let dir = scratch();
+    let file = dir.path().join("master");
+    let start = |id: &str| {
+        let args = ["worker", "--rendezvous", text(&file), "--id", id];
+        Process::start(id, &args, "info")
+    };
+    // There before the master is, and waiting for it.
+    let mut early = start("early");
+    early.wait_for(&["no answer", "No such file"]);
+    let (first, address) = master(&["--rendezvous", text(&file)]);
+    early.wait_for(&["registered", &address]);
+    assert_eq!(
+        std::fs::read_to_string(&file).ok(),
+        Some(format!("{address}\n"))
+    );
+    // Killed, it leaves its file behind: the next one, at another port, replaces it.
+    drop(first);
+    let (second, elsewhere) = master(&["--rendezvous", text(&file)]);
+    assert_ne!(address, elsewhere);
+    early.wait_for(&["registered", &elsewhere]);
+    let sample = job(
+        dir.path(),
+        "job.toml",
+        &[&sample().with_file_name("last.step")],
+        LAST_WITHOUT_AXIS,
+    );
+    let out = dir.path().join("out");
+    let submit = [
+        "submit",
+        text(&sample),
+        "--master",
+        &elsewhere,
+        "-o",
+        text(&out),
+        "-q",
+        "--no-verify",
+    ];
+    succeed(&submit);
+    let path = std::fs::read(out.join("path.csv")).expect("a path");
+    assert!(path == path_of(&sample, dir.path(), "alone", &[]));
+    // Ended in order, it takes its file away.
+    second.signal("-TERM");
+    assert_eq!(second.end().0, Some(0));
+    assert!(!file.exists());
+}
+
+#[test]
+fn a_worker_has_one_way_to_its_master_and_waits_for_a_stated_time() {
+    let dir = scratch();
+    let file = dir.path().join("nowhere");
+    let both = [
+        "worker",
+        "--rendezvous",
+        text(&file),
+        "--master",
+        "127.0.0.1:1",
+    ];
+    for wrong in [&["worker"][..], &both[..]] {
+        assert_eq!(run(wrong).status.code(), Some(2), "{wrong:?}");
+    }
+    let output = run(&["worker", "--rendezvous", text(&file), "--patience", "0"]);
+    assert_eq!(output.status.code(), Some(4));
+    assert!(texts(&output).1.contains("nowhere"), "{output:?}");
+    // What cannot be right does not get right by waiting.
+    std::fs::write(&file, "not an address\n").expect("writable");
+    let output = run(&["worker", "--rendezvous", text(&file)]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
 }

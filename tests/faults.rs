@@ -4,6 +4,8 @@
 mod common;
 #[path = "faults/halo.rs"]
 mod halo;
+#[path = "faults/slow.rs"]
+mod slow;
 
 use std::path::{Path, PathBuf};
 

@@ -123,7 +123,7 @@ fn metrics_are_what_the_documentation_lists_and_the_report_tells() {
     );
     assert_eq!(all("horma_nodes_total"), number(&counters["nodes"]));
     assert_eq!(master["horma_jobs_ended_total{outcome=\"done\"}"], 1.0);
-    assert_eq!(master["horma_jobs"], 0.0);
+    assert_eq!(master["horma_jobs{state=\"running\"}"], 0.0);
     assert_eq!(master["horma_workers{state=\"idle\"}"], 2.0);
     assert_eq!(
         master["horma_job_phase_seconds_count{phase=\"stitch\"}"],

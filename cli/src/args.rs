@@ -1,9 +1,10 @@
 //! What can be typed.
 
+use std::fmt;
 use std::io::stdout;
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use horma_core::Simd;
 use horma_formats::job::Overrides;
@@ -19,6 +20,12 @@ Across machines, each with its certificate:
   horma master --bind 10.0.0.1:7171 --tls-ca ca.pem --tls-cert master.pem --tls-key master.key
   horma worker --master 10.0.0.1:7171 --bind 0.0.0.0:0 --tls-ca ca.pem ...     on every other
   horma submit job.toml --master 10.0.0.1:7171 -o out --tls-ca ca.pem ...
+
+A master that serves, and forgets nothing when it is killed:
+  horma master --store jobs             keeps queue, finished extents and results in jobs/
+  horma submit job.toml --detach        prints the job's number; HORMA_MASTER says where
+  horma status                          how far everything is
+  horma fetch 1 job.toml -o out --wait  the same files as `horma run`
 
 Lengths are in mm, angles in degrees. Flags go over HORMA_* variables, these over the job file.
 
@@ -52,6 +59,16 @@ pub(crate) enum Command {
     Run(Run),
     /// Send a job to a running master, and fetch its path
     Submit(Submit),
+    /// Tell how far the jobs of a master are
+    Status(Status),
+    /// End a job of a master
+    Cancel(Cancel),
+    /// Fetch the path of a job that was sent to a master before
+    ///
+    /// Given the job file as well, with what was said differently then, it does all that `horma run`
+    /// does with a path; without, it writes path.csv and report.json. The master drops the result once
+    /// it is written, unless it is to keep it.
+    Fetch(Fetch),
     /// Hold a path against the designed surface: gouges, excess, scallops
     Verify(Verify),
     /// Serve as a master: workers register, clients submit jobs
@@ -77,7 +94,7 @@ pub(crate) enum Command {
         #[arg(required = true)]
         files: Vec<PathBuf>,
     },
-    /// Measure on this machine what the searches cost
+    /// Measure on this machine what the searches cost, and what clusters gain
     #[command(subcommand)]
     Bench(Bench),
     /// Print shell completions
@@ -91,6 +108,9 @@ pub(crate) enum Command {
 pub(crate) struct Run {
     #[command(flatten)]
     pub job: Job,
+    /// Directory for path.csv, path.ngc, report.json and preview.png
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
     /// Worker processes on this machine; 0 computes in this process
     #[arg(short, long, value_name = "N", env = "HORMA_WORKERS")]
     pub workers: Option<u32>,
@@ -130,11 +150,72 @@ pub(crate) struct Verify {
 pub(crate) struct Submit {
     #[command(flatten)]
     pub job: Job,
+    /// Directory for path.csv, path.ngc, report.json and preview.png
+    #[arg(short, long, value_name = "DIR", required_unless_present = "detach")]
+    pub output: Option<PathBuf>,
+    /// Print the job's number and do not wait: `horma status` and `horma fetch` take it, also after
+    /// the master was started anew on the same store
+    #[arg(short, long, conflicts_with = "output")]
+    pub detach: bool,
+    #[command(flatten)]
+    pub remote: Remote,
+}
+
+/// A master elsewhere.
+#[derive(Debug, Args)]
+pub(crate) struct Remote {
     /// Where the master listens
     #[arg(long, value_name = "HOST:PORT", env = "HORMA_MASTER")]
     pub master: String,
+    /// How long to look for the master when it has gone in the middle, seconds
+    #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
+    pub patience: u64,
     #[command(flatten)]
     pub tls: Tls,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Status {
+    /// The job's number [default: all jobs]
+    #[arg(value_name = "ID")]
+    pub id: Option<u64>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub remote: Remote,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Cancel {
+    /// The job's number
+    #[arg(value_name = "ID")]
+    pub id: u64,
+    #[command(flatten)]
+    pub remote: Remote,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Fetch {
+    /// The job's number
+    #[arg(value_name = "ID")]
+    pub id: u64,
+    /// The job file (TOML): with it also path.ngc, preview.png and the verification
+    #[arg(value_name = "JOB")]
+    pub file: Option<PathBuf>,
+    /// Directory for the results
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Wait until the job is over
+    #[arg(short, long)]
+    pub wait: bool,
+    /// Leave the result with the master
+    #[arg(long)]
+    pub keep: bool,
+    #[command(flatten)]
+    pub remote: Remote,
+    #[command(flatten)]
+    pub how: How,
 }
 
 /// What proves who is who. With it all traffic is encrypted, and both ends of every connection show a
@@ -167,15 +248,19 @@ pub(crate) struct Certs {
     pub name: Vec<String>,
 }
 
-/// A job, where its results go, and what it says differently this time.
+/// A job, and what it says differently this time.
 #[derive(Debug, Args)]
 pub(crate) struct Job {
     /// The job file (TOML)
     #[arg(value_name = "JOB")]
     pub file: PathBuf,
-    /// Directory for path.csv, path.ngc, report.json and preview.png
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
+    #[command(flatten)]
+    pub how: How,
+}
+
+/// How a job is done differently from what its file says.
+#[derive(Debug, Args)]
+pub(crate) struct How {
     /// Show nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
@@ -290,7 +375,7 @@ pub(crate) struct Job {
     pub distribution: Option<String>,
 }
 
-impl Job {
+impl How {
     /// What goes over the job file.
     pub fn overrides(&self, workers: Option<u32>) -> Overrides {
         Overrides {
@@ -330,6 +415,116 @@ Examples:
 Of a job, its part, cutter and motion are taken; the grid, the contact and the method are what is
 varied.")]
     Kernel(BenchKernel),
+    /// Measure clusters of this machine's processes against one process: speed-up, bytes, the papers' model
+    ///
+    /// Every number of workers, distribution and method takes its turn in every round, beside the same
+    /// job in this process on one thread; medians count, with their spread. Every path has to be the
+    /// one process's, to the last bit. CPU time is the operating system's count for each process. Where
+    /// there are fewer cores than workers, wall time says little: the CPU critical path, the master's
+    /// time and the busiest worker's, is what as many cores would be bound by.
+    #[command(after_help = "\
+Examples:
+  horma bench scaling -o scaling          the sample last
+  horma bench scaling job.toml -o scaling --step 0.25 --points-per-revolution 3600
+
+By the exact search a last takes a fraction of a second, and starting processes outweighs the gain: ask
+for a smaller step and more points per revolution. Brute force takes hundreds of times as long for a
+position, so it digitizes few of them, see --thin; it is compared with brute force alone.")]
+    Scaling(BenchScaling),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchScaling {
+    /// The job file (TOML) [default: the sample that `horma init` writes]
+    #[arg(value_name = "JOB")]
+    pub job: Option<PathBuf>,
+    /// Directory for scaling.md, scaling.csv and the diagrams
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Numbers of worker processes, one thread each
+    #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "1,2,4,8", value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub workers: Vec<u32>,
+    /// How workers come by the part; a mesh has no surface
+    #[arg(long, value_name = "D,...", value_delimiter = ',', default_values_t = Way::ALL)]
+    pub distribution: Vec<Way>,
+    /// How the touch is searched
+    #[arg(long, value_name = "M,...", value_delimiter = ',', default_values_t = Search::ALL)]
+    pub method: Vec<Search>,
+    /// How often everything takes its turn
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub rounds: u32,
+    /// By brute force, digitize only every Nth position of a revolution
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..))]
+    pub thin: u32,
+    /// Chordal tolerance of surfaces, mm [default: the job's]
+    #[arg(long, value_name = "MM")]
+    pub tolerance: Option<f64>,
+    /// Travel per revolution, mm [default: the job's]
+    #[arg(long, value_name = "MM")]
+    pub step: Option<f64>,
+    /// Positions per revolution [default: the job's]
+    #[arg(long, value_name = "N")]
+    pub points_per_revolution: Option<u32>,
+    /// Of the network to project on: what every machine's line carries
+    #[arg(long, value_name = "GBIT/S", default_value_t = 10.0, value_parser = positive)]
+    pub network_gbit: f64,
+    /// Of the network to project on: one way
+    #[arg(long, value_name = "US", default_value_t = 50.0, value_parser = positive)]
+    pub latency_us: f64,
+    /// Show no progress, only the tables
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// A distribution, as it is typed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Way {
+    Overlap,
+    Halo,
+    Surface,
+}
+
+impl Way {
+    const ALL: [Self; 3] = [Self::Overlap, Self::Halo, Self::Surface];
+}
+
+/// A method whose cost does not depend on where a worker's positions begin, as it is typed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Search {
+    Exact,
+    Brute,
+}
+
+impl Search {
+    const ALL: [Self; 2] = [Self::Exact, Self::Brute];
+}
+
+impl fmt::Display for Way {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Overlap => "overlap",
+            Self::Halo => "halo",
+            Self::Surface => "surface",
+        })
+    }
+}
+
+impl fmt::Display for Search {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Exact => "exact",
+            Self::Brute => "brute",
+        })
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().map_err(|_| "not a number".to_owned())?;
+    if number > 0.0 && f64::is_finite(number) {
+        Ok(number)
+    } else {
+        Err(format!("{number} is not above 0"))
+    }
 }
 
 #[derive(Debug, Args)]
@@ -363,6 +558,14 @@ pub(crate) struct Master {
     /// --bind holds: certificates, or --insecure [default: nowhere]
     #[arg(long, value_name = "[HOST:]PORT", env = "HORMA_HTTP")]
     pub http: Option<String>,
+    /// Address that the rendezvous file tells; without a port, the port that is bound [default: the
+    /// bound address, or this host's name if that is every interface]
+    #[arg(long, value_name = "HOST[:PORT]", env = "HORMA_ADVERTISE")]
+    pub advertise: Option<String>,
+    /// File to write that address into, whole, once it is bound; taken away in the end. Workers find
+    /// the master by it, and again when it comes back elsewhere
+    #[arg(long, value_name = "FILE", env = "HORMA_RENDEZVOUS")]
+    pub rendezvous: Option<PathBuf>,
     /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated
     #[arg(long, conflicts_with = "tls_ca")]
     pub insecure: bool,
@@ -374,6 +577,18 @@ pub(crate) struct Master {
     /// How long a job waits for workers when there is none, seconds
     #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
     pub patience: u64,
+    /// Directory of what must survive this process: queue, finished extents and results. A master that
+    /// is started on it again goes on where the last one was killed [default: all in memory, and lost]
+    #[arg(long, value_name = "DIR", env = "HORMA_STORE")]
+    pub store: Option<PathBuf>,
+    #[command(flatten)]
+    pub limits: Limits,
+}
+
+/// How much a master takes upon itself.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Limits, beyond which it refuses")]
+pub(crate) struct Limits {
     /// Largest part that a client may send, MB
     #[arg(
         long,
@@ -382,13 +597,35 @@ pub(crate) struct Master {
         default_value_t = 1024
     )]
     pub max_part: u64,
+    /// Jobs that wait or are under way
+    #[arg(long, value_name = "N", env = "HORMA_MAX_JOBS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_jobs: u32,
+    /// Jobs under way at once; fewer if they do not fit into memory together
+    #[arg(long, value_name = "N", env = "HORMA_MAX_RUNNING", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_running: u32,
+    /// Results that are kept until they are fetched, MB; beyond that the oldest are dropped
+    #[arg(long, value_name = "MB", env = "HORMA_KEEP_MB", default_value_t = 1024)]
+    pub keep_mb: u64,
+    /// How long they are kept, hours
+    #[arg(long, value_name = "H", env = "HORMA_KEEP_HOURS", default_value_t = 24)]
+    pub keep_hours: u64,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct Worker {
     /// Where the master listens
-    #[arg(long, value_name = "HOST:PORT", env = "HORMA_MASTER")]
-    pub master: String,
+    #[arg(
+        long,
+        value_name = "HOST:PORT",
+        env = "HORMA_MASTER",
+        required_unless_present = "rendezvous",
+        conflicts_with = "rendezvous"
+    )]
+    pub master: Option<String>,
+    /// File into which the master writes its address; waited for, and read again whenever the master
+    /// does not answer
+    #[arg(long, value_name = "FILE", env = "HORMA_RENDEZVOUS")]
+    pub rendezvous: Option<PathBuf>,
     /// Where to listen; port 0 takes any free one
     #[arg(
         long,
@@ -397,8 +634,9 @@ pub(crate) struct Worker {
         default_value = "127.0.0.1:0"
     )]
     pub bind: String,
-    /// Address at which others reach this worker [default: the one that leads to the master]
-    #[arg(long, value_name = "HOST:PORT", env = "HORMA_ADVERTISE")]
+    /// Address at which others reach this worker; without a port, the port that is bound [default: the
+    /// one that leads to the master]
+    #[arg(long, value_name = "HOST[:PORT]", env = "HORMA_ADVERTISE")]
     pub advertise: Option<String>,
     /// Where to serve metrics and health over HTTP, for whoever may look: a
     /// port of this machine, or HOST:PORT; port 0 takes any free one. Beyond this machine the rule of
@@ -410,7 +648,8 @@ pub(crate) struct Worker {
     pub insecure: bool,
     #[command(flatten)]
     pub tls: Tls,
-    /// Name of this worker, the same after a restart [default: host name and process number]
+    /// Name of this worker, the same after a restart [default: its place in the job under Slurm, else
+    /// host name and process number]
     #[arg(long, env = "HORMA_WORKER_ID")]
     pub id: Option<String>,
     /// Threads to digitize with [default: all cores]
@@ -420,7 +659,8 @@ pub(crate) struct Worker {
     /// best there is]
     #[arg(long, value_name = "SET", env = "HORMA_SIMD")]
     pub simd: Option<Simd>,
-    /// How long to look for a master that is not there, or not there any more, seconds
+    /// How long to look for a master that is not there, or not there any more, seconds. To be left by
+    /// a master is the end of the work and exit code 0; never to find one is 4
     #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
     pub patience: u64,
 }

@@ -13,7 +13,7 @@ use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use axum::routing::get;
 use axum::serve::Listener;
-use horma_master::Master;
+use horma_master::Window;
 use horma_proto::metrics::{self, MEMORY};
 use horma_proto::{Role, Tls, transport};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
@@ -44,7 +44,7 @@ pub(crate) struct Http {
 #[derive(Clone)]
 pub(crate) enum Watched {
     /// A master's.
-    Master(Master),
+    Master(Box<Window>),
     /// A worker's: whether it is registered.
     Worker(watch::Receiver<bool>),
 }
@@ -100,7 +100,7 @@ pub(crate) async fn serve(
         .route("/readyz", get(ready))
         .with_state(seen);
     let routes = match watched {
-        Watched::Master(master) => routes.merge(horma_master::page(master)),
+        Watched::Master(window) => routes.merge(horma_master::page(*window)),
         Watched::Worker(_) => routes,
     };
     let serving = async {
@@ -136,8 +136,8 @@ struct Seen {
 }
 
 async fn render(State(seen): State<Seen>) -> impl IntoResponse {
-    if let Watched::Master(master) = &seen.watched
-        && let Ok((state, _)) = master.look(0).await
+    if let Watched::Master(window) = &seen.watched
+        && let Ok((state, _)) = window.look(0).await
     {
         state.set_gauges();
     }

@@ -7,8 +7,10 @@ mod error;
 
 mod run;
 
+mod client;
 mod cluster;
 mod here;
+mod jobs;
 mod submit;
 mod tls;
 mod verify;
@@ -17,6 +19,7 @@ mod bench;
 mod certs;
 mod http;
 mod inspect;
+mod reach;
 mod serve;
 
 mod progress;
@@ -69,6 +72,9 @@ fn execute(arguments: Arguments) -> Result<()> {
     match arguments.command {
         Command::Run(run) => run::run(&run),
         Command::Submit(submit) => run::submit(&submit),
+        Command::Status(args) => jobs::status(&args),
+        Command::Cancel(args) => jobs::cancel(&args),
+        Command::Fetch(args) => run::fetch(args),
         Command::Verify(args) => verify::verify(&args),
         Command::Master(master) => serve::master(&master),
         Command::Worker(worker) => serve::worker(worker),
@@ -76,6 +82,7 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Init { directory } => inspect::init(&directory),
         Command::Inspect { files } => inspect::inspect(&files),
         Command::Bench(args::Bench::Kernel(bench)) => bench::kernel(&bench),
+        Command::Bench(args::Bench::Scaling(bench)) => bench::scaling(&bench),
         Command::Completions { shell } => {
             args::print_completions(shell);
             Ok(())

@@ -1,10 +1,13 @@
 //! The two servers: master and worker.
 
+use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use horma_core::Simd;
-use horma_master::Config;
+use horma_master::{Clients, Config, Limits};
 use horma_proto::Role;
+use horma_worker::Rendezvous;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
@@ -14,7 +17,7 @@ use crate::args::{Master, Worker};
 use crate::cluster::bind;
 use crate::error::{Error, Result};
 use crate::http::{self, Watched};
-use crate::{say, system, tls};
+use crate::{reach, say, system, tls};
 
 /// How long threads may take to notice that the process ends.
 pub(crate) const NOTICE: Duration = Duration::from_secs(2);
@@ -28,19 +31,33 @@ pub(crate) fn master(args: &Master) -> Result<()> {
         lease: Duration::from_secs(args.lease),
         patience: Duration::from_secs(args.patience),
         regroup: Duration::from_secs(args.patience),
-        max_part: args.max_part.saturating_mul(1_000_000),
         memory: system::memory(),
         tls,
         workers_here: false,
+        clients: Some(Clients {
+            store: args.store.clone(),
+            limits: Limits {
+                part: args.limits.max_part.saturating_mul(1_000_000),
+                queue: args.limits.max_jobs as usize,
+                running: args.limits.max_running as usize,
+                keep_bytes: args.limits.keep_mb.saturating_mul(1_000_000),
+                keep: Duration::from_secs(args.limits.keep_hours.saturating_mul(3600)),
+            },
+        }),
     };
     serve(async {
-        let listener = listen(&args.bind, trusted).await?;
+        let (listener, bound) = listen(&args.bind, trusted).await?;
+        let address = reach::of_master(args.advertise.as_deref(), bound);
+        let rendezvous = args.rendezvous.as_deref();
+        let _published = rendezvous
+            .map(|f| reach::publish(f, &address))
+            .transpose()?;
         let http = http::listen(args.http.as_deref(), Role::Master, trusted).await?;
         let tls = config.tls.clone();
         let shutdown = CancellationToken::new();
-        let (master, serving) = horma_master::start(listener, config, shutdown.clone());
+        let (_, window, serving) = horma_master::start(listener, config, shutdown.clone())?;
         if let Some(http) = http {
-            let (watched, shutdown) = (Watched::Master(master), shutdown.clone());
+            let (watched, shutdown) = (Watched::Master(Box::new(window)), shutdown.clone());
             tokio::spawn(async move { http::serve(http, tls.as_ref(), watched, shutdown).await });
         }
         let mut serving = std::pin::pin!(serving);
@@ -56,19 +73,19 @@ pub(crate) fn master(args: &Master) -> Result<()> {
 pub(crate) fn worker(args: Worker) -> Result<()> {
     let tls = tls::load_as(&args.tls, Role::Worker)?;
     let trusted = tls.is_some() || args.insecure;
-    let config = horma_worker::Config {
-        master: args.master,
-        id: args.id.unwrap_or_else(system::process_name),
-        incarnation: system::incarnation(),
-        advertise: args.advertise,
-        tls,
-        threads: args.threads.map_or_else(system::cores, usize::from),
-        simd: args.simd.unwrap_or_else(Simd::best),
-        patience: Duration::from_secs(args.patience),
-    };
     serve(async {
-        let listener = listen(&args.bind, trusted).await?;
+        let (listener, bound) = listen(&args.bind, trusted).await?;
         let http = http::listen(args.http.as_deref(), Role::Worker, trusted).await?;
+        let config = horma_worker::Config {
+            master: rendezvous(args.rendezvous, args.master),
+            id: args.id.unwrap_or_else(|| reach::worker_name(variable)),
+            incarnation: system::incarnation(),
+            advertise: args.advertise.map(|a| reach::advertised(&a, bound)),
+            tls,
+            threads: args.threads.map_or_else(system::cores, usize::from),
+            simd: args.simd.unwrap_or_else(Simd::best),
+            patience: Duration::from_secs(args.patience),
+        };
         let tls = config.tls.clone();
         let shutdown = CancellationToken::new();
         let (registered, watched) = watch::channel(false);
@@ -85,6 +102,18 @@ pub(crate) fn worker(args: Worker) -> Result<()> {
     })
 }
 
+/// One of the two is given: parsing sees to it.
+fn rendezvous(file: Option<PathBuf>, address: Option<String>) -> Rendezvous {
+    file.map_or_else(
+        || Rendezvous::Address(address.unwrap_or_default()),
+        Rendezvous::File,
+    )
+}
+
+fn variable(name: &str) -> Option<String> {
+    std::env::var(name).ok()
+}
+
 /// Serves to the end, and does not wait for threads that are still computing.
 fn serve(server: impl Future<Output = Result<()>>) -> Result<()> {
     let runtime = runtime()?;
@@ -94,10 +123,10 @@ fn serve(server: impl Future<Output = Result<()>>) -> Result<()> {
 }
 
 /// Listens, and prints where: with port 0 nobody could know otherwise.
-async fn listen(address: &str, trusted: bool) -> Result<TcpListener> {
+async fn listen(address: &str, trusted: bool) -> Result<(TcpListener, SocketAddr)> {
     let (listener, bound) = bind(address, trusted).await?;
     say(&format!("listening on {bound}"));
-    Ok(listener)
+    Ok((listener, bound))
 }
 
 /// The runtime of everything that talks to others.

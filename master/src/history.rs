@@ -4,10 +4,10 @@
 use std::collections::VecDeque;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use horma_proto::metrics::{ATTEMPTS_LOST, JOBS_ENDED};
+use horma_proto::metrics::ATTEMPTS_LOST;
 use serde::Serialize;
 
-use crate::snapshot::{Job, JobState};
+use crate::snapshot::Job;
 use crate::state::{Command, Event, Fault};
 
 /// Events that are remembered.
@@ -77,12 +77,6 @@ impl History {
 
     /// Writes down that a job is over.
     pub fn end(&mut self, job: Job) {
-        let outcome = match job.state {
-            JobState::Done => "done",
-            JobState::Cancelled => "cancelled",
-            JobState::Failed | JobState::Waiting | JobState::Running => "failed",
-        };
-        JOBS_ENDED.add(outcome, 1);
         self.ended.push_front(job);
         self.ended.truncate(ENDED);
     }

@@ -13,7 +13,7 @@ use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 use tokio_stream::wrappers::ReceiverStream;
 
-use crate::driver::Master;
+use crate::window::Window;
 
 /// How often a page is told how things stand.
 const REFRESH: Duration = Duration::from_millis(500);
@@ -32,7 +32,7 @@ const ICON: &str = include_str!("page/icon.svg");
 
 /// The page at `/` and what it asks for: `/api/state` is the state, `/api/events` a stream of states
 /// and events.
-pub fn page(master: Master) -> Router {
+pub fn page(window: Window) -> Router {
     let file = |kind, text| get(move || async move { served(kind, text) });
     Router::new()
         .route("/", file("text/html; charset=utf-8", HTML))
@@ -41,7 +41,7 @@ pub fn page(master: Master) -> Router {
         .route("/icon.svg", file("image/svg+xml", ICON))
         .route("/api/state", get(state))
         .route("/api/events", get(events))
-        .with_state(master)
+        .with_state(window)
 }
 
 fn served(kind: &'static str, text: &'static str) -> impl IntoResponse {
@@ -54,8 +54,8 @@ fn served(kind: &'static str, text: &'static str) -> impl IntoResponse {
     (headers, text)
 }
 
-async fn state(State(master): State<Master>) -> Response {
-    match master.look(0).await {
+async fn state(State(window): State<Window>) -> Response {
+    match window.look(0).await {
         Ok((seen, _)) => Json(seen).into_response(),
         Err(error) => (StatusCode::SERVICE_UNAVAILABLE, error.to_string()).into_response(),
     }
@@ -63,16 +63,16 @@ async fn state(State(master): State<Master>) -> Response {
 
 /// States, and the events between them; from the beginning of what is remembered, or from the one
 /// that a page has seen last. Ends with the master.
-async fn events(State(master): State<Master>, headers: HeaderMap) -> impl IntoResponse {
+async fn events(State(window): State<Window>, headers: HeaderMap) -> impl IntoResponse {
     let last = headers.get("last-event-id");
     let last = last.and_then(|id| id.to_str().ok()?.parse().ok());
     let (told, stream) = mpsc::channel(WAITING);
-    tokio::spawn(watch(master, last.unwrap_or(0), told));
+    tokio::spawn(watch(window, last.unwrap_or(0), told));
     Sse::new(ReceiverStream::new(stream)).keep_alive(KeepAlive::default())
 }
 
 /// Tells somebody who watches how things stand and what happens, until they go or the master stops.
-async fn watch(master: Master, mut last: u64, told: mpsc::Sender<Result<Event, axum::Error>>) {
+async fn watch(window: Window, mut last: u64, told: mpsc::Sender<Result<Event, axum::Error>>) {
     let mut refresh = interval(REFRESH);
     refresh.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -80,7 +80,7 @@ async fn watch(master: Master, mut last: u64, told: mpsc::Sender<Result<Event, a
             _ = refresh.tick() => {}
             () = told.closed() => return,
         }
-        let Ok((seen, happened)) = master.look(last).await else {
+        let Ok((seen, happened)) = window.look(last).await else {
             return;
         };
         let happenings = happened.iter().map(|h| {

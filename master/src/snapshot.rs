@@ -20,10 +20,23 @@ pub struct Snapshot {
     pub version: &'static str,
     /// Jobs that are going on, oldest first.
     pub jobs: Vec<Job>,
+    /// Jobs that wait for their turn, in their order.
+    pub queued: Vec<Queued>,
     /// The last jobs that are over, newest first.
     pub ended: Vec<Job>,
     /// Everybody who is registered, by name.
     pub workers: Vec<Worker>,
+}
+
+/// A job that waits.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Queued {
+    /// Its number.
+    pub job: u64,
+    /// What the client calls it.
+    pub name: String,
+    /// When it came, ms since 1970.
+    pub submitted: u64,
 }
 
 /// A job.
@@ -31,6 +44,8 @@ pub struct Snapshot {
 pub struct Job {
     /// Its number.
     pub job: u64,
+    /// What the client calls it; nothing once it is over.
+    pub name: String,
     /// How far it has come.
     pub state: JobState,
     /// Why it failed.
@@ -153,6 +168,7 @@ pub(crate) fn snapshot(
             .iter()
             .map(|(&id, job)| going_on(state, id, job))
             .collect(),
+        queued: Vec::new(),
         ended: history.ended().cloned().collect(),
         workers: state.members(now).map(worker).collect(),
     }
@@ -193,7 +209,7 @@ fn whole(id: u64, job: &RunningJob, state: JobState) -> Job {
     let positions = job.plan.trajectory.positions;
     let [arrived, inserted] = job.so_far();
     let seconds = job.begin.elapsed().as_secs_f64();
-    let rate = arrived as f64 / seconds;
+    let rate = arrived.saturating_sub(job.resumed) as f64 / seconds;
     let left = positions.saturating_sub(arrived);
     let extents = (0u32..).zip(&job.extents);
     let extents = extents.map(|(number, extent)| {
@@ -214,6 +230,7 @@ fn whole(id: u64, job: &RunningJob, state: JobState) -> Job {
     });
     Job {
         job: id,
+        name: String::new(),
         state,
         reason: None,
         distribution: match job.plan.distribution {
@@ -226,7 +243,7 @@ fn whole(id: u64, job: &RunningJob, state: JobState) -> Job {
         inserted,
         seconds,
         rate,
-        seconds_left: (arrived > 0).then(|| left as f64 / rate),
+        seconds_left: (rate > 0.0).then(|| left as f64 / rate),
         lost: job.lost.len(),
         traffic: job.traffic(),
         extents: extents.collect(),
@@ -236,7 +253,8 @@ fn whole(id: u64, job: &RunningJob, state: JobState) -> Job {
 impl Snapshot {
     /// Sets the gauges that `/metrics` has of a master.
     pub fn set_gauges(&self) {
-        JOBS.set("", self.jobs.len() as f64);
+        JOBS.set("queued", self.queued.len() as f64);
+        JOBS.set("running", self.jobs.len() as f64);
         let extents = || self.jobs.iter().flat_map(|job| &job.extents);
         for (label, state) in [
             ("waiting", ExtentState::Waiting),

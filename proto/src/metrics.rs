@@ -82,12 +82,12 @@ pub const TRAFFIC: Metric = metric(
     Some(("kind", &["to_workers", "results", "between_workers"])),
     BOTH,
 );
-/// Jobs that are going on.
+/// Jobs that are not over.
 pub const JOBS: Metric = metric(
     Kind::Gauge,
     "horma_jobs",
-    "jobs that are going on",
-    None,
+    "jobs that are not over: those that wait for their turn or are being planned, and those that workers are at",
+    Some(("state", &["queued", "running"])),
     MASTER,
 );
 /// Jobs that are over.

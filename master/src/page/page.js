@@ -97,6 +97,7 @@ function beginJob(job) {
 
 function updateJob(card, job) {
   card.dataset.state = job.state;
+  if (job.name) say($("h3", card), `Job ${job.job} · ${job.name}`);
   say($(".state", card), job.state);
   const left = job.seconds_left === null || job.state !== "running" ? "" : ` · ${time(job.seconds_left)} left`;
   const speed = job.arrived ? ` · ${rough.format(job.rate)}/s` : "";
@@ -170,9 +171,12 @@ function walk(event) {
 }
 
 // What is over stays where it was, below what goes on.
-function drawJobs({ jobs, ended }) {
+function drawJobs({ jobs, queued, ended }) {
   const all = [...jobs, ...ended];
-  $("#jobs .none").hidden = all.length > 0;
+  $("#jobs .none").hidden = all.length + queued.length > 0;
+  keep($("#queued"), queued, (job) => job.job, () => make("li"), (item, job) => {
+    say(item, `Job ${job.job} ${job.name} waits since ${new Date(job.submitted).toLocaleTimeString("en-GB")}`);
+  });
   keep($("#all"), all, (job) => job.job, beginJob, updateJob);
 }
 
