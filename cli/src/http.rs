@@ -153,6 +153,7 @@ async fn ready(State(seen): State<Seen>) -> (StatusCode, &'static str) {
         return unready("stopping\n");
     }
     match &seen.watched {
+        Watched::Master(window) if !window.is_open() => unready("stopping\n"),
         Watched::Worker(registered) if !*registered.borrow() => unready("not registered\n"),
         Watched::Worker(_) | Watched::Master(_) => (StatusCode::OK, "ready\n"),
     }

@@ -45,6 +45,7 @@ pub(crate) fn master(args: &Master) -> Result<()> {
             },
         }),
     };
+    let drain = Duration::from_secs(args.drain);
     serve(async {
         let (listener, bound) = listen(&args.bind, trusted).await?;
         let address = reach::of_master(args.advertise.as_deref(), bound);
@@ -55,7 +56,7 @@ pub(crate) fn master(args: &Master) -> Result<()> {
         let http = http::listen(args.http.as_deref(), Role::Master, trusted).await?;
         let tls = config.tls.clone();
         let shutdown = CancellationToken::new();
-        let (_, window, serving) = horma_master::start(listener, config, shutdown.clone())?;
+        let (master, window, serving) = horma_master::start(listener, config, shutdown.clone())?;
         if let Some(http) = http {
             let (watched, shutdown) = (Watched::Master(Box::new(window)), shutdown.clone());
             tokio::spawn(async move { http::serve(http, tls.as_ref(), watched, shutdown).await });
@@ -63,9 +64,14 @@ pub(crate) fn master(args: &Master) -> Result<()> {
         let mut serving = std::pin::pin!(serving);
         tokio::select! {
             served = &mut serving => return served.map_or(Ok(()), |s| Ok(s?)),
-            () = system::interrupted() => shutdown.cancel(),
+            () = system::interrupted() => {}
         }
-        serving.await.map_or(Ok(()), |s| Ok(s?))
+        unless_again(async {
+            master.drain(drain).await;
+            shutdown.cancel();
+            serving.await.map_or(Ok(()), |s| Ok(s?))
+        })
+        .await
     })
 }
 
@@ -87,19 +93,28 @@ pub(crate) fn worker(args: Worker) -> Result<()> {
             patience: Duration::from_secs(args.patience),
         };
         let tls = config.tls.clone();
-        let shutdown = CancellationToken::new();
+        let leave = CancellationToken::new();
         let (registered, watched) = watch::channel(false);
         if let Some(http) = http {
-            let (watched, shutdown) = (Watched::Worker(watched), shutdown.clone());
-            tokio::spawn(async move { http::serve(http, tls.as_ref(), watched, shutdown).await });
+            let (watched, leave) = (Watched::Worker(watched), leave.clone());
+            tokio::spawn(async move { http::serve(http, tls.as_ref(), watched, leave).await });
         }
-        let stopping = shutdown.clone();
-        tokio::spawn(async move {
-            system::interrupted().await;
-            stopping.cancel();
-        });
-        Ok(horma_worker::run(listener, config, registered, shutdown).await?)
+        let running = horma_worker::run(listener, config, registered, leave.clone());
+        let mut running = std::pin::pin!(running);
+        tokio::select! {
+            ran = &mut running => return Ok(ran?),
+            () = system::interrupted() => leave.cancel(),
+        }
+        unless_again(async { Ok(running.await?) }).await
     })
+}
+
+/// Comes to an end in good order, or at once if that is asked for a second time.
+async fn unless_again(ending: impl Future<Output = Result<()>>) -> Result<()> {
+    tokio::select! {
+        ended = ending => ended,
+        () = system::interrupted() => Err(Error::Interrupted),
+    }
 }
 
 /// One of the two is given: parsing sees to it.

@@ -56,6 +56,14 @@ pub(crate) enum Message {
         since: u64,
         reply: oneshot::Sender<(Snapshot, Vec<Happening>)>,
     },
+    /// A worker is about to stop.
+    Leave {
+        worker: String,
+        incarnation: u64,
+        reply: oneshot::Sender<()>,
+    },
+    /// The master is about to: it answers when everybody is through with what was begun.
+    Drain { reply: oneshot::Sender<()> },
     Run {
         plan: Arc<Handout>,
         parts: u32,
@@ -94,6 +102,7 @@ pub(crate) fn start(
         jobs: BTreeMap::new(),
         next_job: 1,
         incarnation,
+        drained: None,
         inbox: inbox.downgrade(),
         count,
         history: History::default(),
@@ -116,6 +125,8 @@ struct Driver {
     jobs: BTreeMap<u64, RunningJob>,
     next_job: u64,
     incarnation: u64,
+    /// Who waits for the end of what was begun.
+    drained: Option<oneshot::Sender<()>>,
     inbox: mpsc::WeakSender<Message>,
     count: watch::Sender<usize>,
     history: History,
@@ -134,6 +145,9 @@ impl Driver {
                     None => break,
                 },
                 _ = ticks.tick() => self.tick(),
+            }
+            if let Some(drained) = self.drained.take_if(|_| self.state.is_idle()) {
+                let _ = drained.send(());
             }
             self.count.send_if_modified(|n| {
                 let now = self.state.workers();
@@ -213,6 +227,22 @@ impl Driver {
                 let happened = self.history.since(since).cloned().collect();
                 // Whoever wanted to see it may have gone.
                 let _ = reply.send((seen, happened));
+            }
+            Message::Leave {
+                worker,
+                incarnation,
+                reply,
+            } => {
+                if self.state.knows(&worker, incarnation) {
+                    info!(worker, "left");
+                    self.apply(Event::Left { worker }, None);
+                }
+                let _ = reply.send(());
+            }
+            Message::Drain { reply } => {
+                info!("draining");
+                self.drained = Some(reply);
+                self.apply(Event::Drain, None);
             }
             Message::Run {
                 plan,

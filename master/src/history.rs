@@ -97,6 +97,8 @@ impl History {
 fn event_in_words(event: &Event) -> Option<(bool, String)> {
     match event {
         Event::Heartbeat { .. } | Event::Tick | Event::Progress { .. } => None,
+        Event::Left { worker } => Some((false, format!("worker {worker} leaves"))),
+        Event::Drain => Some((false, "the master is about to stop".to_owned())),
         Event::Registered { worker, .. } => Some((false, format!("worker {worker} registered"))),
         Event::Submitted { job, extents, .. } => {
             Some((false, format!("job {job} begins, in {extents} extents")))

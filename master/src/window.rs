@@ -17,6 +17,11 @@ pub struct Window {
 }
 
 impl Window {
+    /// Whether the master takes in what comes: not when it is about to stop.
+    pub fn is_open(&self) -> bool {
+        !self.master.draining.is_cancelled()
+    }
+
     /// What goes on, and what has happened since the event of that number.
     ///
     /// # Errors

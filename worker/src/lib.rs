@@ -57,8 +57,9 @@ pub struct Config {
 /// How long open tasks may take to notice a shutdown.
 const DRAIN: Duration = Duration::from_secs(5);
 
-/// Serves on `listener` until `shutdown`, or until the master has been gone for too long. Whether it is
-/// a member of the master is told to `registered` as it changes.
+/// Serves on `listener` until it is told to leave, or until the master has been gone for too long. What
+/// it is at when it leaves is given back: what has come of it is the master's already. Whether it is a
+/// member of the master is told to `registered` as it changes.
 ///
 /// # Errors
 /// [`Error::NoMaster`] if the master never answered, [`Error::Refused`] if it did not want this
@@ -67,8 +68,9 @@ pub async fn run(
     listener: TcpListener,
     config: Config,
     registered: watch::Sender<bool>,
-    shutdown: CancellationToken,
+    leave: CancellationToken,
 ) -> Result<()> {
+    let shutdown = CancellationToken::new();
     let bound = listener.local_addr().map_err(Error::Listener)?;
     info!(worker = config.id, %bound, "listening");
     let pool = rayon::ThreadPoolBuilder::new()
@@ -92,7 +94,7 @@ pub async fn run(
         tokio::spawn(
             async move { transport::serve(service, listener, tls.as_ref(), stopped).await },
         );
-    let outcome = membership::keep(&config, bound, &store, &registered, &shutdown).await;
+    let outcome = membership::keep(&config, bound, &store, &registered, &leave).await;
     // Membership is what a worker lives for: without it there is nobody to serve.
     shutdown.cancel();
     // A task that does not notice is abandoned: the master gives its extent to another.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use horma_proto::metrics::REGISTERED;
 use horma_proto::transport::{self, Trouble, WANTS_TLS};
 use horma_proto::wire::master_client::MasterClient;
-use horma_proto::wire::{HeartbeatRequest, RegisterRequest};
+use horma_proto::wire::{HeartbeatRequest, LeaveRequest, RegisterRequest};
 use horma_proto::{Answer, Role, VERSION};
 use tokio::sync::watch;
 use tokio::time::Instant;
@@ -27,14 +27,14 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 /// Longest time for one call.
 const DEADLINE: Duration = Duration::from_secs(5);
 
-/// Keeps this worker a member until `shutdown`, or until the master has been silent for longer than
+/// Keeps this worker a member until it is told to leave, or until the master has been silent for longer than
 /// the worker's patience: then there is no more work, which is no error if there ever was a master.
 pub(crate) async fn keep(
     config: &Config,
     bound: SocketAddr,
     store: &Store,
     registered: &watch::Sender<bool>,
-    shutdown: &CancellationToken,
+    leaving: &CancellationToken,
 ) -> Result<()> {
     let member = async {
         let mut heard: Option<Instant> = None;
@@ -83,7 +83,12 @@ pub(crate) async fn keep(
     };
     tokio::select! {
         outcome = member => outcome,
-        () = shutdown.cancelled() => Ok(()),
+        () = leaving.cancelled() => {
+            if let Err(reason) = leave(config).await {
+                warn!(master = %config.master, reason, "left without a word");
+            }
+            Ok(())
+        }
     }
 }
 
@@ -91,6 +96,18 @@ pub(crate) async fn keep(
 fn member(registered: &watch::Sender<bool>, is: bool) {
     registered.send_replace(is);
     REGISTERED.set("", f64::from(u8::from(is)));
+}
+
+/// Tells the master that this worker is about to stop, so that what it has goes to others at once.
+async fn leave(config: &Config) -> std::result::Result<(), String> {
+    let master = config.master.look().await?;
+    let mut client = connect(config, &master).map_err(|e| e.to_string())?;
+    let request = LeaveRequest {
+        worker: config.id.clone(),
+        incarnation: config.incarnation,
+    };
+    let left = client.leave(request).await;
+    left.map(drop).map_err(|status| status.message().to_owned())
 }
 
 fn connect(config: &Config, master: &str) -> Result<MasterClient<Channel>> {
