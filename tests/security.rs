@@ -225,7 +225,12 @@ async fn every_call_is_for_one_role() {
         let nothing = tokio_stream::iter([SubmitRequest::default()]);
         check_guard(Role::Client, caller, client.submit(nothing).await);
         let job = 1;
-        let status = client.status(StatusRequest { job: Some(job) }).await;
+        let status = client
+            .status(StatusRequest {
+                job: Some(job),
+                after: 0,
+            })
+            .await;
         check_guard(Role::Client, caller, status);
         let cancel = client.cancel(CancelRequest { job }).await;
         check_guard(Role::Client, caller, cancel);

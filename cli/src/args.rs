@@ -604,6 +604,9 @@ pub(crate) struct Limits {
     /// Jobs that wait or are under way
     #[arg(long, value_name = "N", env = "HORMA_MAX_JOBS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_jobs: u32,
+    /// Calls of clients that are open at once; who waits for a job has one open
+    #[arg(long, value_name = "N", env = "HORMA_MAX_CALLS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_calls: u32,
     /// Jobs under way at once; fewer if they do not fit into memory together
     #[arg(long, value_name = "N", env = "HORMA_MAX_RUNNING", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_running: u32,

@@ -39,6 +39,7 @@ pub(crate) fn master(args: &Master) -> Result<()> {
             limits: Limits {
                 part: args.limits.max_part.saturating_mul(1_000_000),
                 queue: args.limits.max_jobs as usize,
+                calls: args.limits.max_calls as usize,
                 running: args.limits.max_running as usize,
                 keep_bytes: args.limits.keep_mb.saturating_mul(1_000_000),
                 keep: Duration::from_secs(args.limits.keep_hours.saturating_mul(3600)),

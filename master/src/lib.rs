@@ -88,6 +88,8 @@ pub struct Limits {
     pub part: u64,
     /// Jobs that are not over.
     pub queue: usize,
+    /// Calls of clients that are open at once.
+    pub calls: usize,
     /// Jobs at once at the workers.
     pub running: usize,
     /// Results that are kept, bytes.
