@@ -6,7 +6,17 @@ use std::collections::BTreeMap;
 
 use common::{Process, horma};
 use common::{get, http, master, report, run, sample, scratch, succeed, text, texts, worker_with};
+use horma_proto::tls::Role;
+use horma_proto::transport::{connect, endpoint};
 use serde_json::Value;
+use tonic::transport::Channel;
+use tonic_health::pb::HealthCheckRequest;
+use tonic_health::pb::health_check_response::ServingStatus;
+use tonic_health::pb::health_client::HealthClient;
+use tonic_reflection::pb::v1::ServerReflectionRequest;
+use tonic_reflection::pb::v1::server_reflection_client::ServerReflectionClient;
+use tonic_reflection::pb::v1::server_reflection_request::MessageRequest;
+use tonic_reflection::pb::v1::server_reflection_response::MessageResponse;
 
 /// The figures of a process: each series with its labels as they are written.
 fn scrape(address: &str) -> (BTreeMap<String, f64>, String) {
@@ -181,4 +191,69 @@ fn http_is_for_this_machine_unless_said_otherwise() {
         .output();
     let (_, err) = texts(&output.expect("the binary starts"));
     assert!(err.contains("nowhere"), "{err}");
+}
+
+async fn channel(address: &str, role: Role) -> Channel {
+    let to = endpoint(address).expect("an address");
+    connect(&to, role, None).await.expect("listening")
+}
+
+fn asked(service: &str) -> HealthCheckRequest {
+    let service = service.to_owned();
+    HealthCheckRequest { service }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_says_that_it_serves_until_it_is_told_to_stop() {
+    let (master, address) = master(&[]);
+    let mut worker = worker_with(&address, "w", &[]);
+    let line = worker.wait_for(&["listening on"]);
+    let of_worker = line.rsplit(' ').next().expect("a word").to_owned();
+    let [serving, not] = [ServingStatus::Serving, ServingStatus::NotServing].map(i32::from);
+    let servers = [
+        (worker, of_worker, Role::Worker, "horma.cluster.v1.Worker"),
+        (master, address, Role::Master, "horma.cluster.v1.Master"),
+    ];
+    for (process, address, role, service) in servers {
+        let mut client = HealthClient::new(channel(&address, role).await);
+        for name in ["", service] {
+            let health = client.check(asked(name)).await.expect("an answer");
+            assert_eq!(health.into_inner().status, serving, "{name:?}");
+        }
+        let unknown = client.check(asked("nothing")).await;
+        assert_eq!(unknown.expect_err("unknown").code(), tonic::Code::NotFound);
+        let watching = client.watch(asked(service)).await.expect("an answer");
+        let mut watching = watching.into_inner();
+        let mut next = async || watching.message().await.expect("one").expect("more").status;
+        assert_eq!(next().await, serving);
+        process.signal("-TERM");
+        assert_eq!(next().await, not, "{service}");
+        assert_eq!(process.end().0, Some(0));
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_tells_what_it_serves() {
+    let (_master, address) = master(&[]);
+    let mut client = ServerReflectionClient::new(channel(&address, Role::Master).await);
+    let request = ServerReflectionRequest {
+        host: String::new(),
+        message_request: Some(MessageRequest::FileContainingSymbol(
+            "horma.cluster.v1.Master.Submit".to_owned(),
+        )),
+    };
+    let answers = client
+        .server_reflection_info(tokio_stream::iter([request]))
+        .await;
+    let answer = answers.expect("an answer").into_inner().message().await;
+    let answer = answer.expect("one").expect("one");
+    let Some(MessageResponse::FileDescriptorResponse(files)) = answer.message_response else {
+        panic!("{answer:?}");
+    };
+    let file = files.file_descriptor_proto.first().expect("a file");
+    let text = String::from_utf8_lossy(file);
+    assert!(
+        text.contains("SubmitRequest") && text.contains("FetchRows"),
+        "{text}"
+    );
 }

@@ -146,8 +146,15 @@ pub fn start(
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
     let failed = |e| Error::Serve(Arc::new(e));
+    let stopping = master.draining.clone().cancelled_owned();
     let serving = tokio::spawn(async move {
-        let server = transport::serve(service, listener, tls.as_ref(), shutdown.cancelled());
+        let server = transport::serve(
+            service,
+            listener,
+            tls.as_ref(),
+            stopping,
+            shutdown.cancelled(),
+        );
         let mut server = std::pin::pin!(server);
         tokio::select! {
             served = &mut server => return served.map_err(failed),

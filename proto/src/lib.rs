@@ -22,6 +22,7 @@ pub mod transport;
 #[allow(clippy::needless_pass_by_value, clippy::semicolon_if_nothing_returned)]
 pub mod wire {
     tonic::include_proto!("horma.cluster.v1");
+    pub(crate) const DESCRIPTORS: &[u8] = tonic::include_file_descriptor_set!("descriptors");
 }
 
 pub use chunk::{CHUNK_BYTES, Chunks, Messages};

@@ -20,12 +20,14 @@ use tonic::codegen::http::{Request, Response, Uri};
 use tonic::server::NamedService;
 use tonic::transport::server::TcpIncoming;
 use tonic::transport::{Channel, Endpoint, Server};
+use tonic_health::ServingStatus;
 use tower::Service;
 use tower::util::MapResponseLayer;
 
 use crate::accept;
 use crate::refused::Refused;
 use crate::tls::{Role, Tls};
+use crate::wire::DESCRIPTORS;
 
 /// Longest time to connect.
 const CONNECT: Duration = Duration::from_secs(5);
@@ -99,7 +101,8 @@ async fn dial(address: String, role: Role, connector: TlsConnector) -> io::Resul
 }
 
 /// Serves on `listener` until `shutdown` and the end of all open calls; then the log is told what was
-/// refused.
+/// refused. Beside the service it answers gRPC's own questions: after health, which ends when `stopping`
+/// does, and after what is served here. Whoever got through the handshake may ask these.
 ///
 /// # Errors
 /// The listener is gone.
@@ -107,6 +110,7 @@ pub async fn serve<S>(
     service: S,
     listener: TcpListener,
     tls: Option<&Tls>,
+    stopping: impl Future<Output = ()>,
     shutdown: impl Future<Output = ()>,
 ) -> Result<(), tonic::transport::Error>
 where
@@ -121,6 +125,13 @@ where
         + Sync
         + 'static,
 {
+    let (health, asked_after) = tonic_health::server::health_reporter();
+    health.set_serving::<S>().await;
+    let reflection = tonic_reflection::server::Builder::configure()
+        .register_encoded_file_descriptor_set(DESCRIPTORS)
+        .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+        .build_v1()
+        .expect("descriptors that code was generated from");
     let refused = Arc::new(Refused::default());
     let counting = refused.clone();
     let services = Server::builder()
@@ -130,18 +141,34 @@ where
             counting.count(&response);
             response
         }))
-        .add_service(service);
-    let served = match tls {
-        None => {
-            let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-            let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
-            serving.await
+        .add_service(service)
+        .add_service(asked_after)
+        .add_service(reflection);
+    let serving = async {
+        match tls {
+            None => {
+                let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+                let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
+                serving.await
+            }
+            Some(tls) => {
+                let incoming = accept::secured(listener, tls.acceptor.clone(), refused.clone());
+                let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
+                serving.await
+            }
         }
-        Some(tls) => {
-            let incoming = accept::secured(listener, tls.acceptor.clone(), refused.clone());
-            let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
-            serving.await
-        }
+    };
+    let telling = async {
+        stopping.await;
+        health.set_not_serving::<S>().await;
+        let all = ServingStatus::NotServing;
+        health.set_service_status("", all).await;
+        std::future::pending::<Infallible>().await
+    };
+    let served = tokio::select! {
+        biased;
+        never = telling => match never {},
+        served = serving => served,
     };
     refused.tell();
     served

@@ -90,10 +90,10 @@ pub async fn run(
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
     let (tls, stopped) = (config.tls.clone(), shutdown.clone().cancelled_owned());
-    let serving =
-        tokio::spawn(
-            async move { transport::serve(service, listener, tls.as_ref(), stopped).await },
-        );
+    let stopping = leave.clone().cancelled_owned();
+    let serving = tokio::spawn(async move {
+        transport::serve(service, listener, tls.as_ref(), stopping, stopped).await
+    });
     let outcome = membership::keep(&config, bound, &store, &registered, &leave).await;
     // Membership is what a worker lives for: without it there is nobody to serve.
     shutdown.cancel();

@@ -1,4 +1,5 @@
-//! HTTP beyond this machine: for whoever has a certificate of the authority.
+//! What whoever has a certificate of the authority may look at, of any role: HTTP beyond this machine,
+//! and health.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -11,9 +12,11 @@ use tokio_rustls::rustls::crypto::ring;
 use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
 use tokio_rustls::rustls::{ClientConfig, RootCertStore};
+use tonic_health::pb::HealthCheckRequest;
+use tonic_health::pb::health_client::HealthClient;
 
 use crate::common::{self, scratch};
-use crate::{Authority, words};
+use crate::{Authority, dial, words};
 
 /// What a GET over TLS gets, from whoever has these files of its own.
 async fn get(address: &str, trusted: &Authority, own: Option<(&Authority, Role)>) -> String {
@@ -80,4 +83,24 @@ async fn whoever_has_a_certificate_of_any_role_may_look_from_elsewhere() {
     // Whatever comes, it is an alert or nothing.
     let read = plain.read_to_end(&mut answer).await;
     assert!(sent.is_ok() && !answer.starts_with(b"HTTP"), "{read:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn whoever_has_a_certificate_of_any_role_may_ask_after_health() {
+    let dir = scratch();
+    let authority = Authority::new(dir.path(), "certs");
+    let (_master, master) = authority.master();
+    let (_worker, worker) = authority.worker(&master, "w");
+    for caller in Role::ALL {
+        let tls = authority.tls(caller);
+        for (address, role) in [(&master, Role::Master), (&worker, Role::Worker)] {
+            let mut client = HealthClient::new(dial(address, role, &tls).await);
+            let health = client.check(HealthCheckRequest::default()).await;
+            assert!(health.is_ok(), "{caller} asks a {role}: {health:?}");
+        }
+    }
+    let plain = horma_proto::transport::endpoint(&master).expect("an address");
+    let channel = plain.connect_lazy();
+    let health = HealthClient::new(channel).check(HealthCheckRequest::default());
+    assert!(health.await.is_err(), "nobody without a certificate");
 }
