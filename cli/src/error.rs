@@ -94,6 +94,13 @@ pub(crate) enum Error {
     OneProcess,
     #[error("cannot count what goes on: {0}")]
     Metrics(String),
+    #[error("{failed} of {checks} checks failed")]
+    Unfit {
+        failed: usize,
+        checks: usize,
+        /// Whether what is wrong is here.
+        here: bool,
+    },
     #[error("cannot start threads: {0}")]
     Threads(String),
     #[error("interrupted")]
@@ -128,6 +135,7 @@ impl Error {
             | Self::Refused { .. }
             | Self::NoSuchJob { .. }
             | Self::OneProcess
+            | Self::Unfit { here: true, .. }
             | Self::Worker(
                 horma_worker::Error::Address { .. }
                 | horma_worker::Error::Untrusted { .. }
@@ -142,6 +150,7 @@ impl Error {
             | Self::BadReply { .. }
             | Self::Certs(_)
             | Self::Metrics(_)
+            | Self::Unfit { here: false, .. }
             | Self::Threads(_) => 4,
             Self::Interrupted => 130,
         }

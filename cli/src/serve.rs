@@ -119,7 +119,7 @@ async fn unless_again(ending: impl Future<Output = Result<()>>) -> Result<()> {
 }
 
 /// One of the two is given: parsing sees to it.
-fn rendezvous(file: Option<PathBuf>, address: Option<String>) -> Rendezvous {
+pub(crate) fn rendezvous(file: Option<PathBuf>, address: Option<String>) -> Rendezvous {
     file.map_or_else(
         || Rendezvous::Address(address.unwrap_or_default()),
         Rendezvous::File,

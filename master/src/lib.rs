@@ -137,6 +137,7 @@ pub fn start(
     };
     let service = service::Service {
         guard: Guard::of(tls.as_ref()),
+        tls: tls.clone(),
         heartbeat,
         master: master.clone(),
         desk,

@@ -1,17 +1,17 @@
 //! What workers and clients see of the master.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use horma_proto::wire::master_server::Master as Api;
 use horma_proto::wire::path_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
 use horma_proto::wire::{
-    self, CancelReply, CancelRequest, DiscardReply, DiscardRequest, HeartbeatReply,
-    HeartbeatRequest, LeaveReply, LeaveRequest, PathReply, PathRequest, RegisterReply,
-    RegisterRequest, StatusReply, StatusRequest, SubmitReply, SubmitRequest,
+    self, CancelReply, CancelRequest, DialBackReply, DialBackRequest, DiscardReply, DiscardRequest,
+    HeartbeatReply, HeartbeatRequest, LeaveReply, LeaveRequest, PathReply, PathRequest,
+    RegisterReply, RegisterRequest, StatusReply, StatusRequest, SubmitReply, SubmitRequest,
 };
-use horma_proto::{Error, Guard, Role};
+use horma_proto::{Error, Guard, Role, Tls, VERSION, transport};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
@@ -38,6 +38,8 @@ pub(crate) struct Service {
     pub master: Master,
     /// Who may call what.
     pub guard: Guard,
+    /// What this master proves itself by to workers.
+    pub tls: Option<Tls>,
     /// How often a worker is to say that it is alive.
     pub heartbeat: Duration,
     /// The jobs of clients, if there may be any.
@@ -119,6 +121,28 @@ impl Api for Service {
             Some(Going { jobs, next_job }) => Ok(Response::new(HeartbeatReply { jobs, next_job })),
             None => Err(Error::UnknownWorker { worker: name }.into()),
         }
+    }
+
+    async fn dial_back(
+        &self,
+        call: Call<DialBackRequest>,
+    ) -> Result<Response<DialBackReply>, Status> {
+        self.guard.admit(&call, Role::Worker)?;
+        let DialBackRequest { address, word } = call.into_inner();
+        let malformed = |_| Error::Malformed("the word to be said is not of 16 bytes".to_owned());
+        let word = word[..].try_into().map_err(malformed)?;
+        let trouble = if address.is_empty() {
+            String::new()
+        } else {
+            let reached = transport::reach(&address, Role::Worker, self.tls.as_ref(), word).await;
+            reached.err().unwrap_or_default()
+        };
+        let since = SystemTime::now().duration_since(UNIX_EPOCH);
+        Ok(Response::new(DialBackReply {
+            version: VERSION.to_owned(),
+            unix_ms: since.map_or(0, |t| t.as_millis() as u64),
+            trouble,
+        }))
     }
 
     async fn leave(&self, call: Call<LeaveRequest>) -> Result<Response<LeaveReply>, Status> {
