@@ -37,7 +37,7 @@ impl Journal {
     /// dropped.
     pub async fn resume(self, plan: Arc<Handout>, parts: u32) -> Result<Resumed> {
         let resuming = spawn_blocking(move || self.find(&plan, parts));
-        resuming.await.map_err(|_| Error::Interrupted)?
+        resuming.await.map_err(|_| Error::Panicked)?
     }
 
     fn find(self, plan: &Handout, parts: u32) -> Result<Resumed> {

@@ -56,6 +56,8 @@ pub use window::Window;
 pub struct Config {
     /// What proves who is who; without it traffic is plain and anybody may call.
     pub tls: Option<Tls>,
+    /// Connections at once; more wait until others are closed.
+    pub connections: usize,
     /// How often a worker is to say that it is alive.
     pub heartbeat: Duration,
     /// After how long a silence a worker counts as lost.
@@ -117,6 +119,7 @@ pub fn start(
     config: Config,
     shutdown: CancellationToken,
 ) -> Result<(Master, Window, JoinHandle<Result<()>>)> {
+    let connections = config.connections;
     let (tls, clients, heartbeat) = (config.tls.clone(), config.clients.clone(), config.heartbeat);
     let store = clients
         .as_ref()
@@ -152,6 +155,7 @@ pub fn start(
         let server = transport::serve(
             service,
             listener,
+            connections,
             tls.as_ref(),
             stopping,
             shutdown.cancelled(),

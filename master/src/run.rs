@@ -113,7 +113,7 @@ impl Master {
         let here = self.config.workers_here;
         let plan = move || Handout::new(&part, job, distribution, memory, here);
         let planned = spawn_blocking(plan).await;
-        let plan = planned.map_err(|_| Error::Interrupted)?;
+        let plan = planned.map_err(|_| Error::Panicked)?;
         Ok(Planned {
             plan: Arc::new(plan.map_err(Error::Plan)?),
             took: begin.elapsed(),

@@ -12,6 +12,7 @@ mod span;
 mod task;
 
 mod accept;
+mod limit;
 pub mod metrics;
 mod refused;
 pub mod tls;

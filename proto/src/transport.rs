@@ -24,10 +24,10 @@ use tonic_health::ServingStatus;
 use tower::Service;
 use tower::util::MapResponseLayer;
 
-use crate::accept;
 use crate::refused::Refused;
 use crate::tls::{Role, Tls};
 use crate::wire::DESCRIPTORS;
+use crate::{accept, limit};
 
 /// Longest time to connect.
 const CONNECT: Duration = Duration::from_secs(5);
@@ -100,15 +100,17 @@ async fn dial(address: String, role: Role, connector: TlsConnector) -> io::Resul
     Ok(TokioIo::new(stream))
 }
 
-/// Serves on `listener` until `shutdown` and the end of all open calls; then the log is told what was
-/// refused. Beside the service it answers gRPC's own questions: after health, which ends when `stopping`
-/// does, and after what is served here. Whoever got through the handshake may ask these.
+/// Serves on `listener` until `shutdown` and the end of all open calls, at most so many connections at
+/// once: more wait until others are closed. Then the log is told what was refused. Beside the service it
+/// answers gRPC's own questions: after health, which ends when `stopping` does, and after what is served
+/// here. Whoever got through the handshake may ask these.
 ///
 /// # Errors
 /// The listener is gone.
 pub async fn serve<S>(
     service: S,
     listener: TcpListener,
+    connections: usize,
     tls: Option<&Tls>,
     stopping: impl Future<Output = ()>,
     shutdown: impl Future<Output = ()>,
@@ -148,11 +150,13 @@ where
         match tls {
             None => {
                 let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+                let incoming = limit::at_most(connections, incoming);
                 let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
                 serving.await
             }
             Some(tls) => {
                 let incoming = accept::secured(listener, tls.acceptor.clone(), refused.clone());
+                let incoming = limit::at_most(connections, incoming);
                 let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
                 serving.await
             }

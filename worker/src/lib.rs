@@ -54,6 +54,9 @@ pub struct Config {
     pub patience: Duration,
 }
 
+/// Connections at once, of the master and of other workers; more wait until others are closed.
+const CONNECTIONS: usize = 1000;
+
 /// How long open tasks may take to notice a shutdown.
 const DRAIN: Duration = Duration::from_secs(5);
 
@@ -92,7 +95,15 @@ pub async fn run(
     let (tls, stopped) = (config.tls.clone(), shutdown.clone().cancelled_owned());
     let stopping = leave.clone().cancelled_owned();
     let serving = tokio::spawn(async move {
-        transport::serve(service, listener, tls.as_ref(), stopping, stopped).await
+        transport::serve(
+            service,
+            listener,
+            CONNECTIONS,
+            tls.as_ref(),
+            stopping,
+            stopped,
+        )
+        .await
     });
     let outcome = membership::keep(&config, bound, &store, &registered, &leave).await;
     // Membership is what a worker lives for: without it there is nobody to serve.
