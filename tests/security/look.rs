@@ -101,6 +101,7 @@ async fn whoever_has_a_certificate_of_any_role_may_ask_after_health() {
     }
     let plain = horma_proto::transport::endpoint(&master).expect("an address");
     let channel = plain.connect_lazy();
-    let health = HealthClient::new(channel).check(HealthCheckRequest::default());
-    assert!(health.await.is_err(), "nobody without a certificate");
+    let mut client = HealthClient::new(channel);
+    let health = client.check(HealthCheckRequest::default()).await;
+    assert!(health.is_err(), "nobody without a certificate");
 }
