@@ -4,7 +4,7 @@
 use std::process::Stdio;
 use std::time::Duration;
 
-use horma_core::{Distribution, Job, Part, Simd};
+use horma_core::{Job, Part, Sharing, Simd};
 use horma_master::{Config, Outcome, Progress};
 use tokio::net::TcpListener;
 use tokio::process::{Child, Command};
@@ -29,7 +29,7 @@ const WORKER_PATIENCE: &str = "5";
 pub(crate) async fn run(
     part: Part,
     job: Job,
-    distribution: Distribution,
+    sharing: Sharing,
     workers: u32,
     threads: usize,
     simd: Simd,
@@ -66,7 +66,7 @@ pub(crate) async fn run(
         });
     }
     everybody_there(&mut children, master.workers()).await?;
-    Ok(master.run(part, job, distribution, 1, progress).await?)
+    Ok(master.run(part, job, sharing, 1, progress).await?)
 }
 
 /// Waits until every child that lives has registered.

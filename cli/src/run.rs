@@ -31,7 +31,7 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
             let threads = args.threads.map(usize::from);
             let simd = args.simd.unwrap_or_else(Simd::best);
             let (workers, job) = (file.cluster.workers, file.job);
-            let distribution = file.cluster.distribution;
+            let sharing = file.cluster.sharing;
             if workers == 0 {
                 let threads = threads.unwrap_or_else(system::cores);
                 let run = move || here::run(&part, job, threads, simd, &display, &stop);
@@ -40,7 +40,7 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
             }
             let progress = progress(display);
             let threads = threads.unwrap_or(1);
-            cluster::run(part, job, distribution, workers, threads, simd, progress).await
+            cluster::run(part, job, sharing, workers, threads, simd, progress).await
         },
     )
 }
@@ -54,17 +54,9 @@ pub(crate) fn submit(args: &args::Submit) -> Result<()> {
         {
             return Err(Error::OneProcess);
         }
-        let distribution = file.cluster.distribution;
+        let sharing = file.cluster.sharing;
         let (job, progress) = (file.job, progress(display));
-        submit::run(
-            part,
-            job,
-            distribution,
-            &args.master,
-            tls.as_ref(),
-            progress,
-        )
-        .await
+        submit::run(part, job, sharing, &args.master, tls.as_ref(), progress).await
     })
 }
 

@@ -1,6 +1,6 @@
 //! A run on a master elsewhere: the part goes out, the path comes back.
 
-use horma_core::{Distribution, Job, Part, Record, Trajectory, stitch};
+use horma_core::{Job, Part, Record, Sharing, Trajectory, stitch};
 use horma_master::{Outcome, Progress};
 use horma_proto::transport::{self, Trouble, WANTS_TLS};
 use horma_proto::wire::master_client::MasterClient;
@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 pub(crate) async fn run(
     part: Part,
     job: Job,
-    distribution: Distribution,
+    sharing: Sharing,
     address: &str,
     tls: Option<&Tls>,
     progress: Progress,
@@ -33,7 +33,7 @@ pub(crate) async fn run(
 
     progress("send", 0, 0);
     let failed = |status: Status| refusal(address, &status);
-    let replies = client.submit(tokio_stream::iter(requests(part, job, distribution)));
+    let replies = client.submit(tokio_stream::iter(requests(part, job, sharing)));
     let mut replies = replies
         .await
         .map_err(|s| wants_tls(failed(s), tls))?
@@ -74,12 +74,12 @@ pub(crate) async fn run(
 fn requests(
     part: Part,
     job: Job,
-    distribution: Distribution,
+    sharing: Sharing,
 ) -> impl Iterator<Item = SubmitRequest> + Send + 'static {
     let header = SubmitHeader {
         version: VERSION.to_owned(),
         job: Some(horma_proto::job_to_wire(&job)),
-        distribution: horma_proto::distribution_to_wire(distribution).into(),
+        sharing: Some(horma_proto::sharing_to_wire(sharing)),
     };
     let bodies = part.bodies.into_iter();
     let bodies = Chunks::of(bodies.map(|b| horma_proto::body_to_wire(&b)));

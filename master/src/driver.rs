@@ -8,9 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use horma_core::{
-    Distribution, ExtentRecord, Handout, Job, Part, Phase, Record, SubTrajectory, stitch,
-};
+use horma_core::{ExtentRecord, Handout, Job, Part, Phase, Record, Sharing, SubTrajectory, stitch};
 use horma_proto::TaskId;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
@@ -62,7 +60,7 @@ pub(crate) enum Message {
     },
     Run {
         plan: Arc<Handout>,
-        parts: u32,
+        workers: u32,
         progress: Progress,
         reply: oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>,
     },
@@ -120,21 +118,21 @@ impl Master {
         &self,
         part: Part,
         job: Job,
-        distribution: Distribution,
+        sharing: Sharing,
         at_least: usize,
         progress: Progress,
     ) -> Result<Outcome> {
         let begin = Instant::now();
         progress("discretize", 0, 0);
-        let plan = Arc::new(crate::plan(part, job, distribution, &self.config).await?);
+        let plan = Arc::new(crate::plan(part, job, sharing, &self.config).await?);
         let discretized = begin.elapsed();
-        let parts = self.gather(at_least.max(1)).await?;
+        let workers = self.gather(at_least.max(1)).await?;
 
         let begin = Instant::now();
         let (reply, outcome) = oneshot::channel();
         let message = Message::Run {
             plan: plan.clone(),
-            parts,
+            workers,
             progress: progress.clone(),
             reply,
         };
@@ -289,13 +287,13 @@ impl Driver {
             }
             Message::Run {
                 plan,
-                parts,
+                workers,
                 progress,
                 reply,
             } => {
                 let job = self.next_job;
                 self.next_job += 1;
-                let running = RunningJob::new(plan, parts, progress, reply);
+                let running = RunningJob::new(plan, workers, progress, reply);
                 let (extents, halos) = (running.extents.len() as u32, running.halos());
                 let positions = running.plan.trajectory.positions;
                 info!(job, extents, positions, "job");

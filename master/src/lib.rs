@@ -20,7 +20,7 @@ mod received;
 use std::sync::Arc;
 use std::time::Duration;
 
-use horma_core::{Distribution, Handout, Job, Part, Record, ToolPath};
+use horma_core::{Handout, Job, Part, Record, Sharing, ToolPath};
 use horma_proto::wire::master_server::MasterServer;
 use horma_proto::{Guard, MAX_MESSAGE, Tls, transport};
 use tokio::net::TcpListener;
@@ -99,11 +99,11 @@ pub fn start(
 pub(crate) async fn plan(
     part: Part,
     job: Job,
-    distribution: Distribution,
+    sharing: Sharing,
     config: &Config,
 ) -> Result<Handout> {
     let (memory, here) = (config.memory, config.workers_here);
-    let plan = move || Handout::new(&part, job, distribution, memory, here);
+    let plan = move || Handout::new(&part, job, sharing, memory, here);
     let planned = tokio::task::spawn_blocking(plan).await;
     planned
         .map_err(|_| Error::Interrupted)?

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use horma_core::{Distribution, Job, Part};
+use horma_core::{Job, Part, Sharing};
 use horma_proto::wire::master_server::Master as Api;
 use horma_proto::wire::submit_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
@@ -109,7 +109,7 @@ impl Api for Service {
     ) -> Result<Response<Self::SubmitStream>, Status> {
         self.guard.admit(&call, Role::Client)?;
         let submitted = receive(call.into_inner(), self.max_part).await?;
-        let (part, job, distribution) = submitted;
+        let (part, job, sharing) = submitted;
         info!(bodies = part.bodies.len(), "submitted");
         let (replies, stream) = mpsc::channel(WAITING_REPLIES);
         let master = self.master.clone();
@@ -121,7 +121,7 @@ impl Api for Service {
                 let progress = Reply::Progress(wire::Progress { phase, done, total });
                 let _ = telling.try_send(Ok(reply(progress)));
             });
-            let run = master.run(part, job, distribution, 1, progress);
+            let run = master.run(part, job, sharing, 1, progress);
             let outcome = tokio::select! {
                 outcome = run => outcome,
                 // The client hung up: dropping the run cancels it.
@@ -150,7 +150,7 @@ fn check_version(theirs: String) -> Result<(), Error> {
 async fn receive(
     mut requests: Streaming<SubmitRequest>,
     max_part: u64,
-) -> Result<(Part, Job, Distribution), Status> {
+) -> Result<(Part, Job, Sharing), Status> {
     let mut job = None;
     let mut part = Part::default();
     let mut messages = Messages::default();
@@ -164,14 +164,13 @@ async fn receive(
         match (next?.map(|r| r.kind), &job) {
             (None, _) => break,
             (Some(Some(Request::Header(header))), None) => {
-                let distribution = header.distribution();
                 check_version(header.version)?;
-                let distribution = horma_proto::distribution_from_wire(distribution)?;
+                let sharing = horma_proto::sharing_from_wire(header.sharing.as_ref())?;
                 let header = header.job.ok_or(Error::Missing {
                     message: "submission",
                     field: "a job",
                 })?;
-                job = Some((horma_proto::job_from_wire(&header)?, distribution));
+                job = Some((horma_proto::job_from_wire(&header)?, sharing));
             }
             (Some(Some(Request::Bodies(chunk))), Some(_)) => {
                 bytes += chunk.data.len() as u64;
@@ -200,8 +199,8 @@ async fn receive(
     if !messages.is_empty() {
         return Err(missing("the end of its last body").into());
     }
-    let (job, distribution) = job.ok_or(missing("a header"))?;
-    Ok((part, job, distribution))
+    let (job, sharing) = job.ok_or(missing("a header"))?;
+    Ok((part, job, sharing))
 }
 
 /// Sends a path and its record; stops if the client hangs up.
