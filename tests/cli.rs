@@ -639,3 +639,55 @@ fn a_bench_prints_its_table_and_leaves_others_results_alone() {
     let bench = ["bench", "kernel", text(&missing), "-o", text(&out)];
     check(&bench, 2, &["missing.toml"]);
 }
+
+#[test]
+fn a_bench_of_clusters_tells_what_each_took_and_what_that_projects() {
+    let dir = scratch();
+    let out = dir.path().join("scaling");
+    let last = sample().with_file_name("last.step");
+    let tiny = job(dir.path(), "job.toml", &[&last], GRID);
+    let bench = ["bench", "scaling", text(&tiny), "-o", text(&out), "-q"];
+    let more = ["--workers", "1,3", "--rounds", "2", "--thin", "6"];
+    let said = succeed(&[&bench[..], &more[..]].concat());
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
+    assert_eq!(said.trim_end(), read("scaling.md").trim_end());
+    for words in [
+        "one process",
+        "m = n/p + o",
+        "**Not measured.**",
+        "10 Gbit/s",
+    ] {
+        assert!(said.contains(words), "{words:?} is not in:\n{said}");
+    }
+    let csv = read("scaling.csv");
+    let (head, runs) = csv.split_once('\n').expect("a header");
+    let column = |name: &str| head.split(',').position(|c| c == name).expect(name);
+    let field = |run: &str, name: &str| run.split(',').nth(column(name)).expect(name).to_owned();
+    // Two methods, each in one process and as three distributions on two numbers of workers, twice.
+    assert_eq!(runs.lines().count(), 2 * (1 + 3 * 2) * 2, "{csv}");
+    for run in runs.lines() {
+        let number = |name: &str| field(run, name).parse::<f64>().expect(name);
+        let workers = number("workers");
+        assert!(number("wall_s") > 0.0 && number("positions") > 0.0, "{run}");
+        assert_eq!(number("extents"), workers, "{run}");
+        assert_eq!(number("bytes_to_workers") > 0.0, workers > 0.0, "{run}");
+        let fetched = field(run, "distribution") == "halo" && workers > 1.0;
+        assert_eq!(number("bytes_between_workers") > 0.0, fetched, "{run}");
+    }
+    let diagrams = [
+        "rows",
+        "bytes",
+        "time-exact",
+        "speedup-brute",
+        "projection-brute",
+    ];
+    for name in diagrams {
+        assert!(read(&format!("{name}.svg")).ends_with("</svg>\n"), "{name}");
+    }
+    let missing = dir.path().join("missing.toml");
+    check(
+        &["bench", "scaling", text(&missing), "-o", text(&out)],
+        2,
+        &["missing.toml"],
+    );
+}

@@ -3,9 +3,10 @@
 
 mod common;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
-use common::{data, job, master, path_of, report, run, sample, scratch, succeed};
+use common::{Process, data, job, master, path_of, report, run, sample, scratch, succeed};
 use common::{text, texts, worker};
 use serde_json::Value;
 
@@ -141,6 +142,27 @@ fn surfaces_take_less_than_a_hundredth_of_the_bytes_of_their_points() {
     assert!(path == by_halo && path == by_surface);
     assert!(halo < overlap, "{halo} {overlap}");
     assert!(100 * surface < overlap, "{surface} {overlap}");
+}
+
+/// Each worker has several extents, and in halo holds the rows of several.
+#[test]
+fn more_extents_than_workers_are_the_same() {
+    let (dir, job) = (scratch(), sample());
+    let alone = path_of(&job, dir.path(), "alone", &[]);
+    for distribution in DISTRIBUTIONS {
+        let how = ["--workers", "3", "--distribution", distribution];
+        let each = ["--extents-per-worker", "4"];
+        let path = path_of(&job, dir.path(), distribution, &[&how[..], &each].concat());
+        assert!(path == alone, "{distribution}");
+        let report = report(&dir.path().join(distribution));
+        assert_eq!(report["job"]["cluster"]["extents_per_worker"], 4);
+        assert_eq!(report["extents"].as_array().map(Vec::len), Some(12));
+        check_traffic(distribution, &report);
+        let shares = report["extents"].as_array().expect("extents").iter();
+        let shares = shares.flat_map(|e| e["shares"].as_array().expect("shares"));
+        let workers: BTreeSet<_> = shares.filter_map(|s| s["worker"].as_str()).collect();
+        assert_eq!(workers.len(), 3, "everybody had some");
+    }
 }
 
 #[test]
@@ -321,4 +343,75 @@ fn a_cluster_made_by_hand_gives_the_same_bytes() {
         assert_eq!(workers, ["a", "b"]);
         check_traffic(distribution, &report);
     }
+}
+
+#[test]
+fn workers_find_their_master_by_a_file_and_again_when_it_came_back_elsewhere() {
+    let dir = scratch();
+    let file = dir.path().join("master");
+    let start = |id: &str| {
+        let args = ["worker", "--rendezvous", text(&file), "--id", id];
+        Process::start(id, &args, "info")
+    };
+    // There before the master is, and waiting for it.
+    let mut early = start("early");
+    early.wait_for(&["no answer", "No such file"]);
+    let (first, address) = master(&["--rendezvous", text(&file)]);
+    early.wait_for(&["registered", &address]);
+    assert_eq!(
+        std::fs::read_to_string(&file).ok(),
+        Some(format!("{address}\n"))
+    );
+    // Killed, it leaves its file behind: the next one, at another port, replaces it.
+    drop(first);
+    let (second, elsewhere) = master(&["--rendezvous", text(&file)]);
+    assert_ne!(address, elsewhere);
+    early.wait_for(&["registered", &elsewhere]);
+    let sample = job(
+        dir.path(),
+        "job.toml",
+        &[&sample().with_file_name("last.step")],
+        LAST_WITHOUT_AXIS,
+    );
+    let out = dir.path().join("out");
+    let submit = [
+        "submit",
+        text(&sample),
+        "--master",
+        &elsewhere,
+        "-o",
+        text(&out),
+        "-q",
+        "--no-verify",
+    ];
+    succeed(&submit);
+    let path = std::fs::read(out.join("path.csv")).expect("a path");
+    assert!(path == path_of(&sample, dir.path(), "alone", &[]));
+    // Ended in order, it takes its file away.
+    second.signal("-TERM");
+    assert_eq!(second.end().0, Some(0));
+    assert!(!file.exists());
+}
+
+#[test]
+fn a_worker_has_one_way_to_its_master_and_waits_for_a_stated_time() {
+    let dir = scratch();
+    let file = dir.path().join("nowhere");
+    let both = [
+        "worker",
+        "--rendezvous",
+        text(&file),
+        "--master",
+        "127.0.0.1:1",
+    ];
+    for wrong in [&["worker"][..], &both[..]] {
+        assert_eq!(run(wrong).status.code(), Some(2), "{wrong:?}");
+    }
+    let output = run(&["worker", "--rendezvous", text(&file), "--patience", "0"]);
+    assert_eq!(output.status.code(), Some(4));
+    assert!(texts(&output).1.contains("nowhere"), "{output:?}");
+    // What cannot be right does not get right by waiting.
+    std::fs::write(&file, "not an address\n").expect("writable");
+    let output = run(&["worker", "--rendezvous", text(&file)]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
 }

@@ -1,9 +1,10 @@
 //! What can be typed.
 
+use std::fmt;
 use std::io::stdout;
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use horma_core::Simd;
 use horma_formats::job::Overrides;
@@ -77,7 +78,7 @@ pub(crate) enum Command {
         #[arg(required = true)]
         files: Vec<PathBuf>,
     },
-    /// Measure on this machine what the searches cost
+    /// Measure on this machine what the searches cost, and what clusters gain
     #[command(subcommand)]
     Bench(Bench),
     /// Print shell completions
@@ -340,6 +341,116 @@ Examples:
 Of a job, its part, cutter and motion are taken; the grid, the contact and the method are what is
 varied.")]
     Kernel(BenchKernel),
+    /// Measure clusters of this machine's processes against one process: speed-up, bytes, the papers' model
+    ///
+    /// Every number of workers, distribution and method takes its turn in every round, beside the same
+    /// job in this process on one thread; medians count, with their spread. Every path has to be the
+    /// one process's, to the last bit. CPU time is the operating system's count for each process. Where
+    /// there are fewer cores than workers, wall time says little: the CPU critical path, the master's
+    /// time and the busiest worker's, is what as many cores would be bound by.
+    #[command(after_help = "\
+Examples:
+  horma bench scaling -o scaling          the sample last
+  horma bench scaling job.toml -o scaling --step 0.25 --points-per-revolution 3600
+
+By the exact search a last takes a fraction of a second, and starting processes outweighs the gain: ask
+for a smaller step and more points per revolution. Brute force takes hundreds of times as long for a
+position, so it digitizes few of them, see --thin; it is compared with brute force alone.")]
+    Scaling(BenchScaling),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchScaling {
+    /// The job file (TOML) [default: the sample that `horma init` writes]
+    #[arg(value_name = "JOB")]
+    pub job: Option<PathBuf>,
+    /// Directory for scaling.md, scaling.csv and the diagrams
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Numbers of worker processes, one thread each
+    #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "1,2,4,8", value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub workers: Vec<u32>,
+    /// How workers come by the part; a mesh has no surface
+    #[arg(long, value_name = "D,...", value_delimiter = ',', default_values_t = Way::ALL)]
+    pub distribution: Vec<Way>,
+    /// How the touch is searched
+    #[arg(long, value_name = "M,...", value_delimiter = ',', default_values_t = Search::ALL)]
+    pub method: Vec<Search>,
+    /// How often everything takes its turn
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub rounds: u32,
+    /// By brute force, digitize only every Nth position of a revolution
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..))]
+    pub thin: u32,
+    /// Chordal tolerance of surfaces, mm [default: the job's]
+    #[arg(long, value_name = "MM")]
+    pub tolerance: Option<f64>,
+    /// Travel per revolution, mm [default: the job's]
+    #[arg(long, value_name = "MM")]
+    pub step: Option<f64>,
+    /// Positions per revolution [default: the job's]
+    #[arg(long, value_name = "N")]
+    pub points_per_revolution: Option<u32>,
+    /// Of the network to project on: what every machine's line carries
+    #[arg(long, value_name = "GBIT/S", default_value_t = 10.0, value_parser = positive)]
+    pub network_gbit: f64,
+    /// Of the network to project on: one way
+    #[arg(long, value_name = "US", default_value_t = 50.0, value_parser = positive)]
+    pub latency_us: f64,
+    /// Show no progress, only the tables
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// A distribution, as it is typed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Way {
+    Overlap,
+    Halo,
+    Surface,
+}
+
+impl Way {
+    const ALL: [Self; 3] = [Self::Overlap, Self::Halo, Self::Surface];
+}
+
+/// A method whose cost does not depend on where a worker's positions begin, as it is typed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Search {
+    Exact,
+    Brute,
+}
+
+impl Search {
+    const ALL: [Self; 2] = [Self::Exact, Self::Brute];
+}
+
+impl fmt::Display for Way {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Overlap => "overlap",
+            Self::Halo => "halo",
+            Self::Surface => "surface",
+        })
+    }
+}
+
+impl fmt::Display for Search {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Exact => "exact",
+            Self::Brute => "brute",
+        })
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().map_err(|_| "not a number".to_owned())?;
+    if number > 0.0 && f64::is_finite(number) {
+        Ok(number)
+    } else {
+        Err(format!("{number} is not above 0"))
+    }
 }
 
 #[derive(Debug, Args)]
@@ -368,6 +479,14 @@ pub(crate) struct Master {
         default_value = "127.0.0.1:7171"
     )]
     pub bind: String,
+    /// Address that the rendezvous file tells; without a port, the port that is bound [default: the
+    /// bound address, or this host's name if that is every interface]
+    #[arg(long, value_name = "HOST[:PORT]", env = "HORMA_ADVERTISE")]
+    pub advertise: Option<String>,
+    /// File to write that address into, whole, once it is bound; taken away in the end. Workers find
+    /// the master by it, and again when it comes back elsewhere
+    #[arg(long, value_name = "FILE", env = "HORMA_RENDEZVOUS")]
+    pub rendezvous: Option<PathBuf>,
     /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated
     #[arg(long, conflicts_with = "tls_ca")]
     pub insecure: bool,
@@ -392,8 +511,18 @@ pub(crate) struct Master {
 #[derive(Debug, Args)]
 pub(crate) struct Worker {
     /// Where the master listens
-    #[arg(long, value_name = "HOST:PORT", env = "HORMA_MASTER")]
-    pub master: String,
+    #[arg(
+        long,
+        value_name = "HOST:PORT",
+        env = "HORMA_MASTER",
+        required_unless_present = "rendezvous",
+        conflicts_with = "rendezvous"
+    )]
+    pub master: Option<String>,
+    /// File into which the master writes its address; waited for, and read again whenever the master
+    /// does not answer
+    #[arg(long, value_name = "FILE", env = "HORMA_RENDEZVOUS")]
+    pub rendezvous: Option<PathBuf>,
     /// Where to listen; port 0 takes any free one
     #[arg(
         long,
@@ -402,15 +531,17 @@ pub(crate) struct Worker {
         default_value = "127.0.0.1:0"
     )]
     pub bind: String,
-    /// Address at which others reach this worker [default: the one that leads to the master]
-    #[arg(long, value_name = "HOST:PORT", env = "HORMA_ADVERTISE")]
+    /// Address at which others reach this worker; without a port, the port that is bound [default: the
+    /// one that leads to the master]
+    #[arg(long, value_name = "HOST[:PORT]", env = "HORMA_ADVERTISE")]
     pub advertise: Option<String>,
     /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated
     #[arg(long, conflicts_with = "tls_ca")]
     pub insecure: bool,
     #[command(flatten)]
     pub tls: Tls,
-    /// Name of this worker, the same after a restart [default: host name and process number]
+    /// Name of this worker, the same after a restart [default: its place in the job under Slurm, else
+    /// host name and process number]
     #[arg(long, env = "HORMA_WORKER_ID")]
     pub id: Option<String>,
     /// Threads to digitize with [default: all cores]
@@ -420,7 +551,8 @@ pub(crate) struct Worker {
     /// best there is]
     #[arg(long, value_name = "SET", env = "HORMA_SIMD")]
     pub simd: Option<Simd>,
-    /// How long to look for a master that is not there, or not there any more, seconds
+    /// How long to look for a master that is not there, or not there any more, seconds. To be left by
+    /// a master is the end of the work and exit code 0; never to find one is 4
     #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
     pub patience: u64,
 }

@@ -1,4 +1,5 @@
-//! `bench kernel`: what the searches cost on this machine, as ratios measured in one run.
+//! `bench kernel`: what the searches cost on this machine, as ratios measured in one run; and `bench
+//! scaling`, in a module of its own.
 //!
 //! One part is digitized in many ways, and figures come out: as a table, as numbers and as a diagram.
 //! Nothing is tuned here and no path is written.
@@ -10,10 +11,12 @@ mod plot;
 mod table;
 mod turns;
 
+mod scaling;
+
 use std::io::Write;
 use std::path::Path;
 
-use horma_core::{Motion, place};
+use horma_core::{Motion, Part, place};
 use horma_formats::job::{self, JobFile, Overrides};
 use horma_formats::output::{self, Staging};
 use horma_formats::{part, plot as diagram, sample};
@@ -23,6 +26,7 @@ use crate::error::Result;
 use crate::progress::Display;
 use crate::say;
 use measure::Subject;
+pub(crate) use scaling::scaling;
 use turns::Effort;
 
 /// Measures, prints the table and writes the results.
@@ -64,9 +68,28 @@ fn measure_and_write(args: &BenchKernel, display: &Display) -> Result<String> {
 
 /// The part, the cutter and the motion of a job, or of the sample.
 fn subject(job: Option<&Path>, display: &Display) -> Result<Subject> {
+    let (file, name, part) = read(job, &Overrides::default(), display)?;
+    Ok(Subject {
+        name,
+        part,
+        cutter: file.job.cutter,
+        // Searches are compared position by position.
+        motion: Motion {
+            path_tolerance: None,
+            ..file.job.motion
+        },
+    })
+}
+
+/// A job or the sample, the name of its part, and the part in its place.
+fn read(
+    job: Option<&Path>,
+    overrides: &Overrides,
+    display: &Display,
+) -> Result<(JobFile, String, Part)> {
     let (file, name, part) = match job {
         Some(path) => {
-            let file = job::read(path, &Overrides::default())?;
+            let file = job::read(path, overrides)?;
             let (part, warnings) = part::read_all(&file.files)?;
             for warning in warnings {
                 display.note(&format!("warning: {warning}"));
@@ -76,21 +99,13 @@ fn subject(job: Option<&Path>, display: &Display) -> Result<Subject> {
         }
         None => {
             let path = Path::new(sample::JOB);
-            let file = job::parse(sample::job_toml(), path, &Overrides::default())?;
+            let file = job::parse(sample::job_toml(), path, overrides)?;
             let part = sample::last(&sample::LastStyle::WOMEN)?;
             (file, "the sample last".to_owned(), part)
         }
     };
-    Ok(Subject {
-        name,
-        part: place(part, file.axis)?,
-        cutter: file.job.cutter,
-        // Searches are compared position by position.
-        motion: Motion {
-            path_tolerance: None,
-            ..file.job.motion
-        },
-    })
+    let part = place(part, file.axis)?;
+    Ok((file, name, part))
 }
 
 /// The part's files, without their folders.

@@ -5,12 +5,12 @@ use std::process::Stdio;
 use std::time::Duration;
 
 use horma_core::{Job, Part, Sharing, Simd};
-use horma_master::{Config, Outcome, Progress};
+use horma_master::{Config, Master, Outcome, Progress};
 use tokio::net::TcpListener;
 use tokio::process::{Child, Command};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
-use tokio_util::sync::CancellationToken;
+use tokio_util::sync::{CancellationToken, DropGuard};
 
 use crate::error::{Error, Result};
 use crate::system;
@@ -35,6 +35,21 @@ pub(crate) async fn run(
     simd: Simd,
     progress: Progress,
 ) -> Result<Outcome> {
+    let local = start(workers, threads, simd).await?;
+    Ok(local.master.run(part, job, sharing, 1, progress).await?)
+}
+
+/// A master in this process and its worker processes, until it is dropped.
+pub(crate) struct Local {
+    pub master: Master,
+    /// Process numbers of the workers.
+    pub workers: Vec<u32>,
+    _children: JoinSet<String>,
+    _stopped: DropGuard,
+}
+
+/// Starts a master, and `workers` processes of `threads` threads each that register with it.
+pub(crate) async fn start(workers: u32, threads: usize, simd: Simd) -> Result<Local> {
     let listener = bind("127.0.0.1:0").await?;
     let address = listener.local_addr().map_err(|source| Error::Bind {
         address: "127.0.0.1:0".to_owned(),
@@ -52,12 +67,14 @@ pub(crate) async fn run(
         workers_here: true,
     };
     let shutdown = CancellationToken::new();
-    let _stopped = shutdown.clone().drop_guard();
+    let stopped = shutdown.clone().drop_guard();
     let (master, _serving) = horma_master::start(listener, config, shutdown);
     // Each child belongs to a task that waits for its end; dropping the set kills them all.
     let mut children = JoinSet::new();
+    let mut numbers = Vec::new();
     for i in 1..=workers {
         let mut child = spawn(&format!("local-{i}"), &address.to_string(), threads, simd)?;
+        numbers.extend(child.id());
         children.spawn(async move {
             match child.wait().await {
                 Ok(status) => status.to_string(),
@@ -66,7 +83,12 @@ pub(crate) async fn run(
         });
     }
     everybody_there(&mut children, master.workers()).await?;
-    Ok(master.run(part, job, sharing, 1, progress).await?)
+    Ok(Local {
+        master,
+        workers: numbers,
+        _children: children,
+        _stopped: stopped,
+    })
 }
 
 /// Waits until every child that lives has registered.
@@ -99,6 +121,7 @@ fn spawn(id: &str, master: &str, threads: usize, simd: Simd) -> Result<Child> {
         .args(["--threads", &threads.to_string()])
         .args(["--simd", &simd.to_string()])
         .env_remove("HORMA_ADVERTISE")
+        .env_remove("HORMA_RENDEZVOUS")
         .env_remove("HORMA_TLS_CA")
         .env_remove("HORMA_TLS_CERT")
         .env_remove("HORMA_TLS_KEY")

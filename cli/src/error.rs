@@ -121,7 +121,9 @@ impl Error {
             | Self::Refused { .. }
             | Self::OneProcess
             | Self::Worker(
-                horma_worker::Error::Address { .. } | horma_worker::Error::Untrusted { .. },
+                horma_worker::Error::Address { .. }
+                | horma_worker::Error::Untrusted { .. }
+                | horma_worker::Error::Refused { .. },
             ) => 2,
             Self::Master(_)
             | Self::Worker(_)

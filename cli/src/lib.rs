@@ -16,6 +16,7 @@ mod verify;
 mod bench;
 mod certs;
 mod inspect;
+mod reach;
 mod serve;
 
 mod progress;
@@ -75,6 +76,7 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Init { directory } => inspect::init(&directory),
         Command::Inspect { files } => inspect::inspect(&files),
         Command::Bench(args::Bench::Kernel(bench)) => bench::kernel(&bench),
+        Command::Bench(args::Bench::Scaling(bench)) => bench::scaling(&bench),
         Command::Completions { shell } => {
             args::print_completions(shell);
             Ok(())

@@ -1,10 +1,13 @@
 //! The two servers: master and worker.
 
+use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use horma_core::Simd;
 use horma_master::Config;
 use horma_proto::Role;
+use horma_worker::Rendezvous;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
@@ -12,7 +15,7 @@ use tokio_util::sync::CancellationToken;
 use crate::args::{Master, Worker};
 use crate::cluster::bind;
 use crate::error::{Error, Result};
-use crate::{say, system, tls};
+use crate::{reach, say, system, tls};
 
 /// How long threads may take to notice that the process ends.
 pub(crate) const NOTICE: Duration = Duration::from_secs(2);
@@ -32,7 +35,12 @@ pub(crate) fn master(args: &Master) -> Result<()> {
         workers_here: false,
     };
     serve(async {
-        let listener = listen(&args.bind, trusted).await?;
+        let (listener, bound) = listen(&args.bind, trusted).await?;
+        let address = reach::of_master(args.advertise.as_deref(), bound);
+        let rendezvous = args.rendezvous.as_deref();
+        let _published = rendezvous
+            .map(|f| reach::publish(f, &address))
+            .transpose()?;
         let shutdown = CancellationToken::new();
         let (_master, serving) = horma_master::start(listener, config, shutdown.clone());
         let mut serving = std::pin::pin!(serving);
@@ -48,18 +56,18 @@ pub(crate) fn master(args: &Master) -> Result<()> {
 pub(crate) fn worker(args: Worker) -> Result<()> {
     let tls = tls::load_as(&args.tls, Role::Worker)?;
     let trusted = tls.is_some() || args.insecure;
-    let config = horma_worker::Config {
-        master: args.master,
-        id: args.id.unwrap_or_else(system::process_name),
-        incarnation: system::incarnation(),
-        advertise: args.advertise,
-        tls,
-        threads: args.threads.map_or_else(system::cores, usize::from),
-        simd: args.simd.unwrap_or_else(Simd::best),
-        patience: Duration::from_secs(args.patience),
-    };
     serve(async {
-        let listener = listen(&args.bind, trusted).await?;
+        let (listener, bound) = listen(&args.bind, trusted).await?;
+        let config = horma_worker::Config {
+            master: rendezvous(args.rendezvous, args.master),
+            id: args.id.unwrap_or_else(|| reach::worker_name(variable)),
+            incarnation: system::incarnation(),
+            advertise: args.advertise.map(|a| reach::advertised(&a, bound)),
+            tls,
+            threads: args.threads.map_or_else(system::cores, usize::from),
+            simd: args.simd.unwrap_or_else(Simd::best),
+            patience: Duration::from_secs(args.patience),
+        };
         let shutdown = CancellationToken::new();
         let stopping = shutdown.clone();
         tokio::spawn(async move {
@@ -68,6 +76,18 @@ pub(crate) fn worker(args: Worker) -> Result<()> {
         });
         Ok(horma_worker::run(listener, config, shutdown).await?)
     })
+}
+
+/// One of the two is given: parsing sees to it.
+fn rendezvous(file: Option<PathBuf>, address: Option<String>) -> Rendezvous {
+    file.map_or_else(
+        || Rendezvous::Address(address.unwrap_or_default()),
+        Rendezvous::File,
+    )
+}
+
+fn variable(name: &str) -> Option<String> {
+    std::env::var(name).ok()
 }
 
 /// Serves to the end, and does not wait for threads that are still computing.
@@ -80,7 +100,7 @@ fn serve(server: impl Future<Output = Result<()>>) -> Result<()> {
 
 /// Listens, and prints where: with port 0 nobody could know otherwise. Beyond this machine only if
 /// what comes from there can be trusted.
-async fn listen(address: &str, trusted: bool) -> Result<TcpListener> {
+async fn listen(address: &str, trusted: bool) -> Result<(TcpListener, SocketAddr)> {
     let listener = bind(address).await?;
     let bound = listener.local_addr().map_err(|source| Error::Bind {
         address: address.to_owned(),
@@ -92,7 +112,7 @@ async fn listen(address: &str, trusted: bool) -> Result<TcpListener> {
         });
     }
     say(&format!("listening on {bound}"));
-    Ok(listener)
+    Ok((listener, bound))
 }
 
 /// The runtime of everything that talks to others.

@@ -31,10 +31,30 @@ pub(crate) fn load() -> f64 {
     System::load_average().map_or(0.0, |load| load.one)
 }
 
-/// A name for this process that differs from others' on this and other machines.
-pub(crate) fn process_name() -> String {
-    let host = System::host_name().unwrap_or_else(|_| "host".to_owned());
-    format!("{host}-{}", std::process::id())
+/// CPU time that each of these processes has taken so far, s; 0 for one that is not there, and where
+/// the system does not tell.
+pub(crate) fn cpu_seconds(processes: &[u32]) -> Vec<f64> {
+    processes
+        .iter()
+        .map(|&p| cpu_of(p).unwrap_or(0.0))
+        .collect()
+}
+
+#[cfg(target_os = "linux")]
+fn cpu_of(process: u32) -> Option<f64> {
+    let pid = nix::unistd::Pid::from_raw(i32::try_from(process).ok()?);
+    let taken = nix::time::clock_getcpuclockid(pid).ok()?.now().ok()?;
+    Some(std::time::Duration::from(taken).as_secs_f64())
+}
+
+#[cfg(not(target_os = "linux"))]
+fn cpu_of(_process: u32) -> Option<f64> {
+    None
+}
+
+/// This host's name.
+pub(crate) fn host_name() -> String {
+    System::host_name().unwrap_or_else(|_| "localhost".to_owned())
 }
 
 /// A number that differs from one start of a process to the next.

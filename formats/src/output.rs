@@ -28,6 +28,24 @@ pub const BENCH_FIGURES: &str = "kernel.json";
 /// The bench's diagram.
 pub const BENCH_PLOT: &str = "kernel.svg";
 
+/// Every name that a bench of clusters may give a file of its output directory.
+pub const SCALING_FILES: [&str; 10] = [
+    SCALING_TABLE,
+    SCALING_FIGURES,
+    "rows.svg",
+    "bytes.svg",
+    "time-exact.svg",
+    "time-brute.svg",
+    "speedup-exact.svg",
+    "speedup-brute.svg",
+    "projection-exact.svg",
+    "projection-brute.svg",
+];
+/// Its tables.
+pub const SCALING_TABLE: &str = "scaling.md";
+/// Every run in figures.
+pub const SCALING_FIGURES: &str = "scaling.csv";
+
 /// Begins the name of a file that is still being written.
 const UNFINISHED: &str = ".horma-";
 

@@ -34,7 +34,7 @@ pub struct Curve {
 }
 
 /// Number of colours that a curve can have.
-pub const COLORS: usize = 2;
+pub const COLORS: usize = 4;
 
 /// Size of the picture, and the frame in it: left, top, right, bottom.
 const SIZE: [f64; 2] = [720.0, 480.0];
@@ -45,10 +45,12 @@ text{font-family:system-ui,sans-serif;font-size:13px;fill:#24292f}\
 .title{font-size:17px;font-weight:600}.minor{fill:#57606a}\
 .paper{fill:#ffffff}.grid{stroke:#d8dee4;fill:none}.frame{stroke:#57606a;fill:none}\
 .curve{fill:none;stroke-width:2.2;stroke-linejoin:round}.dashed{stroke-dasharray:7 4}\
-.c0{stroke:#0969da}.c1{stroke:#bc4c00}.d0{fill:#0969da}.d1{fill:#bc4c00}\
+.c0{stroke:#0969da}.c1{stroke:#bc4c00}.c2{stroke:#1a7f37}.c3{stroke:#8c959f}\
+.d0{fill:#0969da}.d1{fill:#bc4c00}.d2{fill:#1a7f37}.d3{fill:#8c959f}\
 @media (prefers-color-scheme:dark){\
 text{fill:#e6edf3}.minor{fill:#9da7b3}.paper{fill:#0d1117}.grid{stroke:#30363d}.frame{stroke:#9da7b3}\
-.c0{stroke:#58a6ff}.c1{stroke:#f0883e}.d0{fill:#58a6ff}.d1{fill:#f0883e}}";
+.c0{stroke:#58a6ff}.c1{stroke:#f0883e}.c2{stroke:#3fb950}.c3{stroke:#8b949e}\
+.d0{fill:#58a6ff}.d1{fill:#f0883e}.d2{fill:#3fb950}.d3{fill:#8b949e}}";
 
 /// Draws a diagram.
 pub fn svg(plot: &Plot) -> String {
@@ -69,16 +71,16 @@ pub fn svg(plot: &Plot) -> String {
     };
     let x = Axis::over(values(0), [left, right]);
     let y = Axis::over(values(1), [bottom, top]);
-    for decade in x.decades() {
-        let at = x.decade(decade);
+    for tick in &x.ticks {
+        let at = x.at(tick.exponent());
         line(&mut out, "grid", [at, top], [at, bottom]);
-        let label = power(decade);
+        let label = tick.label();
         text(&mut out, "minor", "middle", [at, bottom + 20.0], &label);
     }
-    for decade in y.decades() {
-        let at = y.decade(decade);
+    for tick in &y.ticks {
+        let at = y.at(tick.exponent());
         line(&mut out, "grid", [left, at], [right, at]);
-        let label = power(decade);
+        let label = tick.label();
         text(&mut out, "minor", "end", [left - 8.0, at + 4.5], &label);
     }
     let (wide, high) = (right - left, bottom - top);
@@ -113,10 +115,9 @@ fn shown(value: f64) -> bool {
     value > 0.0 && value.is_finite()
 }
 
-/// A logarithmic axis over whole decades.
+/// A logarithmic axis, from tick to tick.
 struct Axis {
-    low: i32,
-    high: i32,
+    ticks: Vec<Tick>,
     ends: [f64; 2],
 }
 
@@ -126,31 +127,57 @@ impl Axis {
             Some(span.map_or((v, v), |(low, high)| (low.min(v), high.max(v))))
         });
         let (low, high) = span.unwrap_or((1.0, 10.0));
-        // A hair beyond a decade does not ask for another one.
-        let low = (low.log10() + 0.02).floor() as i32;
-        let high = (high.log10() - 0.02).ceil() as i32;
-        Self {
-            low,
-            high: high.max(low + 1),
-            ends,
+        // A hair beyond a tick does not ask for another one.
+        let (low, high) = (low.log10() + 0.02, high.log10() - 0.02);
+        let first = low.floor() as i32;
+        let last = (high.ceil() as i32).max(first + 1);
+        // Within two decades there is room for what lies between.
+        let digits: &[u8] = if last - first > 2 { &[1] } else { &[1, 2, 5] };
+        let within = |decade| digits.iter().map(move |&digit| Tick { digit, decade });
+        let mut ticks: Vec<Tick> = (first..=last).flat_map(within).collect();
+        while ticks.len() > 2 && ticks[1].exponent() <= low {
+            ticks.remove(0);
         }
-    }
-
-    fn decades(&self) -> std::ops::RangeInclusive<i32> {
-        self.low..=self.high
+        while ticks.len() > 2 && ticks[ticks.len() - 2].exponent() >= high {
+            ticks.pop();
+        }
+        Self { ticks, ends }
     }
 
     fn place(&self, value: f64) -> f64 {
         self.at(value.log10())
     }
 
-    fn decade(&self, decade: i32) -> f64 {
-        self.at(f64::from(decade))
+    fn at(&self, exponent: f64) -> f64 {
+        let end = |tick: Option<&Tick>| tick.map_or(0.0, |t| t.exponent());
+        let (low, high) = (end(self.ticks.first()), end(self.ticks.last()));
+        let share = (exponent - low) / (high - low);
+        self.ends[0] + (self.ends[1] - self.ends[0]) * share
+    }
+}
+
+/// A labelled value of an axis: a digit times a power of ten.
+#[derive(Clone, Copy)]
+struct Tick {
+    digit: u8,
+    decade: i32,
+}
+
+impl Tick {
+    fn exponent(self) -> f64 {
+        f64::from(self.decade) + f64::from(self.digit).log10()
     }
 
-    fn at(&self, exponent: f64) -> f64 {
-        let share = (exponent - f64::from(self.low)) / f64::from(self.high - self.low);
-        self.ends[0] + (self.ends[1] - self.ends[0]) * share
+    fn label(self) -> String {
+        match self.digit {
+            1 => power(self.decade),
+            digit if (-3..=2).contains(&self.decade) => {
+                // The shortest text of a sum may be long.
+                let places = usize::try_from(-self.decade).unwrap_or(0);
+                format!("{:.places$}", f64::from(digit) * 10f64.powi(self.decade))
+            }
+            digit => format!("{digit}·{}", power(self.decade)),
+        }
     }
 }
 
@@ -168,12 +195,14 @@ fn power(exponent: i32) -> String {
 
 /// Two curves above each other, then the next two.
 fn legend(out: &mut String, plot: &Plot) {
-    let [left, top, ..] = FRAME;
+    let [left, top, right, _] = FRAME;
+    let columns = plot.curves.len().div_ceil(2).max(1);
+    let pitch = ((right - left) / columns as f64).min(190.0);
     for (k, curve) in plot.curves.iter().enumerate() {
-        let x = left + 190.0 * (k / 2) as f64;
+        let x = left + pitch * (k / 2) as f64;
         let y = top - 38.0 + 20.0 * (k % 2) as f64;
-        draw(out, curve, &[[x, y], [x + 34.0, y]]);
-        text(out, "", "start", [x + 42.0, y + 4.5], &curve.name);
+        draw(out, curve, &[[x, y], [x + 26.0, y]]);
+        text(out, "", "start", [x + 33.0, y + 4.5], &curve.name);
     }
 }
 
@@ -268,6 +297,19 @@ mod tests {
             assert!(!drawn.contains("NaN") && !drawn.contains("inf"), "{drawn}");
             assert!(drawn.ends_with("</svg>\n"));
         }
+    }
+
+    #[test]
+    fn a_short_axis_has_what_lies_between_decades() {
+        let labels = |low: f64, high: f64| {
+            let axis = Axis::over([low, high].into_iter(), [0.0, 1.0]);
+            axis.ticks.iter().map(|t| t.label()).collect::<Vec<_>>()
+        };
+        assert_eq!(labels(1.0, 8.0), ["1", "2", "5", "10"]);
+        assert_eq!(labels(0.03, 0.3), ["0.02", "0.05", "0.1", "0.2", "0.5"]);
+        assert_eq!(labels(3.0, 3.0), ["2", "5"]);
+        assert_eq!(labels(2.0e4, 4.0e4), ["2·10⁴", "5·10⁴"]);
+        assert_eq!(labels(1.0, 1024.0), ["1", "10", "100", "1000"]);
     }
 
     #[test]

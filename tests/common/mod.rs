@@ -106,6 +106,11 @@ impl Process {
     pub fn start(name: &str, args: &[&str], log: &str) -> Self {
         let mut command = horma();
         command.args(args).env("HORMA_LOG", log);
+        Self::of(name, command)
+    }
+
+    /// Starts what may be the binary on another host.
+    pub fn of(name: &str, mut command: Command) -> Self {
         let spawned = command
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -164,6 +169,19 @@ impl Process {
         }
     }
 
+    /// Whether it has said, by now, a line that contains all of `words`.
+    pub fn has_said(&mut self, words: &[&str]) -> bool {
+        self.seen.extend(self.lines.try_iter());
+        self.seen
+            .iter()
+            .any(|line| words.iter().all(|w| line.contains(w)))
+    }
+
+    /// Whether it has ended.
+    pub fn has_ended(&mut self) -> bool {
+        self.child.try_wait().expect("a child of ours").is_some()
+    }
+
     /// Waits for the end; returns the exit code and everything that was said.
     pub fn end(mut self) -> (Option<i32>, String) {
         let begin = Instant::now();
@@ -203,6 +221,15 @@ impl Drop for Process {
         if std::thread::panicking() {
             eprint!("{}", self.log());
         }
+    }
+}
+
+/// Looks again and again until something holds.
+pub fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !holds() {
+        assert!(begin.elapsed() < DEADLINE, "{what}: not in {DEADLINE:?}");
+        std::thread::sleep(Duration::from_millis(5));
     }
 }
 

@@ -2,12 +2,13 @@
 //!
 //! `work` digitizes a task, whatever its rows come from; `receive` takes in what is sent, `store` holds
 //! rows for the length of a job, `halo` gets those that other workers hold. What a worker holds, the
-//! master has too, so it may be killed at any time. It never decides what to compute, never opens a
-//! file, and never talks to a client.
+//! master has too, so it may be killed at any time. It never decides what to compute, opens no
+//! file but the one that tells where the master is, and never talks to a client.
 
 mod error;
 
 mod membership;
+mod rendezvous;
 mod service;
 
 mod receive;
@@ -17,7 +18,6 @@ mod store;
 
 mod work;
 
-use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -29,12 +29,13 @@ use tokio_util::sync::CancellationToken;
 use tracing::info;
 
 pub use error::{Error, Result};
+pub use rendezvous::Rendezvous;
 
 /// What a worker has to know.
 #[derive(Debug, Clone)]
 pub struct Config {
-    /// The master, `host:port`.
-    pub master: String,
+    /// How to find the master.
+    pub master: Rendezvous,
     /// Name of this worker, the same after a restart.
     pub id: String,
     /// A number that differs from one start to the next.
@@ -62,11 +63,7 @@ const DRAIN: Duration = Duration::from_secs(5);
 /// worker, and errors of the operating system.
 pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationToken) -> Result<()> {
     let bound = listener.local_addr().map_err(Error::Listener)?;
-    let address = match &config.advertise {
-        Some(address) => address.clone(),
-        None => reachable(bound, &config.master).to_string(),
-    };
-    info!(worker = config.id, %bound, address, "listening");
+    info!(worker = config.id, %bound, "listening");
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(config.threads)
         .build()
@@ -88,7 +85,7 @@ pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationTo
         tokio::spawn(
             async move { transport::serve(service, listener, tls.as_ref(), stopped).await },
         );
-    let outcome = membership::keep(&config, &address, &store, &shutdown).await;
+    let outcome = membership::keep(&config, bound, &store, &shutdown).await;
     // Membership is what a worker lives for: without it there is nobody to serve.
     shutdown.cancel();
     // A task that does not notice is abandoned: the master gives its extent to another.
@@ -96,19 +93,4 @@ pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationTo
         served.map_err(Error::Serve)?;
     }
     outcome
-}
-
-/// The listener's address as others see it: a listener on every interface is reached at the one
-/// that leads to the master.
-fn reachable(bound: SocketAddr, master: &str) -> SocketAddr {
-    if !bound.ip().is_unspecified() {
-        return bound;
-    }
-    // Connecting a datagram socket sends nothing; it only asks the system for a route.
-    let any: IpAddr = bound.ip();
-    let towards = UdpSocket::bind((any, 0)).and_then(|socket| {
-        socket.connect(master)?;
-        socket.local_addr()
-    });
-    towards.map_or(bound, |local| SocketAddr::new(local.ip(), bound.port()))
 }

@@ -1,5 +1,6 @@
 //! Membership: register with the master, then say now and then that this worker is alive.
 
+use std::net::SocketAddr;
 use std::time::Duration;
 
 use horma_proto::transport::{self, Trouble, WANTS_TLS};
@@ -14,6 +15,7 @@ use tracing::{info, warn};
 
 use crate::Config;
 use crate::error::{Error, Result};
+use crate::rendezvous::reachable;
 use crate::store::Store;
 
 /// Pause before the master is tried again; it doubles up to the longest.
@@ -27,49 +29,44 @@ const DEADLINE: Duration = Duration::from_secs(5);
 /// the worker's patience: then there is no more work, which is no error if there ever was a master.
 pub(crate) async fn keep(
     config: &Config,
-    address: &str,
+    bound: SocketAddr,
     store: &Store,
     shutdown: &CancellationToken,
 ) -> Result<()> {
     let member = async {
-        let mut client = connect(config)?;
         let mut heard: Option<Instant> = None;
         let begin = Instant::now();
         let mut pause = FIRST_PAUSE;
         loop {
-            let silence = match register(&mut client, config, address).await {
-                Ok((interval, master)) => {
-                    info!(master = config.master, "registered");
-                    store.keep_master(master);
-                    pause = FIRST_PAUSE;
-                    let silence = heartbeats(&mut client, config, store, interval).await;
-                    heard = Some(Instant::now());
-                    silence
-                }
-                Err(status) => status,
-            };
-            let reason = match Answer::of(&silence) {
-                Answer::Stranger => continue,
-                Answer::Silence => silent(config, &silence, heard.is_some())?,
-                Answer::Forbidden => {
-                    return Err(Error::Untrusted {
-                        address: config.master.clone(),
-                        reason: silence.message().to_owned(),
-                    });
-                }
-                Answer::Wrong | Answer::Impossible | Answer::Failed => {
-                    return Err(Error::Refused {
-                        address: config.master.clone(),
-                        reason: silence.message().to_owned(),
-                    });
+            let reason = match config.master.look().await {
+                Err(unknown) => unknown,
+                Ok(master) => {
+                    let mut client = connect(config, &master)?;
+                    let address = config.advertise.clone();
+                    let address = address.unwrap_or_else(|| reachable(bound, &master).to_string());
+                    let silence = match register(&mut client, config, &address).await {
+                        Ok((interval, incarnation)) => {
+                            info!(master, address, "registered");
+                            store.keep_master(incarnation);
+                            pause = FIRST_PAUSE;
+                            let silence = heartbeats(&mut client, config, store, interval).await;
+                            heard = Some(Instant::now());
+                            silence
+                        }
+                        Err(status) => status,
+                    };
+                    match silent(config, &master, &silence, heard.is_some())? {
+                        None => continue,
+                        Some(reason) => reason,
+                    }
                 }
             };
-            warn!(master = config.master, reason, "no answer");
+            warn!(master = %config.master, reason, "no answer");
             if heard.unwrap_or(begin).elapsed() >= config.patience {
                 return match heard {
                     Some(_) => Ok(()),
                     None => Err(Error::NoMaster {
-                        address: config.master.clone(),
+                        address: config.master.to_string(),
                         waited: config.patience,
                         reason,
                     }),
@@ -85,26 +82,34 @@ pub(crate) async fn keep(
     }
 }
 
-fn connect(config: &Config) -> Result<MasterClient<Channel>> {
-    let endpoint = transport::endpoint(&config.master).map_err(|_| Error::Address {
-        address: config.master.clone(),
+fn connect(config: &Config, master: &str) -> Result<MasterClient<Channel>> {
+    let endpoint = transport::endpoint(master).map_err(|_| Error::Address {
+        address: master.to_owned(),
     })?;
     let endpoint = endpoint.timeout(DEADLINE);
     let channel = transport::connect_lazily(&endpoint, Role::Master, config.tls.as_ref());
     Ok(MasterClient::new(channel))
 }
 
-/// Why the master says nothing; an error if it never will.
-fn silent(config: &Config, status: &Status, heard: bool) -> Result<String> {
+/// Why the master says nothing; nothing if it only wants to be told again who this is, and an error if
+/// it never will say anything else.
+fn silent(config: &Config, master: &str, status: &Status, heard: bool) -> Result<Option<String>> {
+    let address = master.to_owned();
+    let reason = status.message().to_owned();
+    match Answer::of(status) {
+        Answer::Stranger => return Ok(None),
+        Answer::Silence => {}
+        Answer::Forbidden => return Err(Error::Untrusted { address, reason }),
+        Answer::Wrong | Answer::Impossible | Answer::Failed => {
+            return Err(Error::Refused { address, reason });
+        }
+    }
     match Trouble::of(status, Role::Master) {
         Trouble::Broken(reason) if config.tls.is_none() && !heard => {
-            Ok(format!("{reason}; {WANTS_TLS}"))
+            Ok(Some(format!("{reason}; {WANTS_TLS}")))
         }
-        Trouble::Broken(reason) | Trouble::Unreachable(reason) => Ok(reason),
-        Trouble::Untrusted(reason) => Err(Error::Untrusted {
-            address: config.master.clone(),
-            reason,
-        }),
+        Trouble::Broken(reason) | Trouble::Unreachable(reason) => Ok(Some(reason)),
+        Trouble::Untrusted(reason) => Err(Error::Untrusted { address, reason }),
     }
 }
 

@@ -228,12 +228,12 @@ fn grid(density: &Density) -> String {
     grid.unwrap_or_else(|| "mesh".to_owned())
 }
 
-fn header(names: &[&str]) -> Vec<String> {
+pub(super) fn header(names: &[&str]) -> Vec<String> {
     names.iter().map(|&name| name.to_owned()).collect()
 }
 
 /// Three significant digits, and all digits before the point.
-fn three(value: f64) -> String {
+pub(super) fn three(value: f64) -> String {
     if !value.is_finite() {
         return "-".to_owned();
     }
