@@ -10,7 +10,10 @@ use horma_proto::tls::{Role, Tls};
 use horma_proto::transport::{connect, endpoint};
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::worker_client::WorkerClient;
-use horma_proto::wire::{DigitizeRequest, HeartbeatRequest, RegisterRequest, SubmitRequest};
+use horma_proto::wire::{
+    CancelRequest, DigitizeRequest, DiscardRequest, HeartbeatRequest, PathRequest, RegisterRequest,
+    StatusRequest, SubmitRequest,
+};
 use tonic::transport::{Certificate, Channel, ClientTlsConfig};
 use tonic::{Code, Status};
 
@@ -217,14 +220,23 @@ async fn every_call_is_for_one_role() {
         check_guard(Role::Worker, caller, heartbeat);
         let nothing = tokio_stream::iter([SubmitRequest::default()]);
         check_guard(Role::Client, caller, client.submit(nothing).await);
+        let job = 1;
+        let status = client.status(StatusRequest { job: Some(job) }).await;
+        check_guard(Role::Client, caller, status);
+        let cancel = client.cancel(CancelRequest { job }).await;
+        check_guard(Role::Client, caller, cancel);
+        let fetch = client.fetch(PathRequest { job, wait: true }).await;
+        check_guard(Role::Client, caller, fetch);
+        let discard = client.discard(DiscardRequest { job }).await;
+        check_guard(Role::Client, caller, discard);
         let mut client = WorkerClient::new(dial(&worker, Role::Worker, &tls).await);
         let nothing = tokio_stream::iter([DigitizeRequest::default()]);
         check_guard(Role::Master, caller, client.digitize(nothing).await);
     }
     serving.signal("-TERM");
     let (_, log) = serving.end();
-    // Two roles too many at each of three calls, and one submission without a header.
-    assert!(log.contains("forbidden=6 malformed=1"), "{log}");
+    // Two roles too many at each of seven calls, and one submission without a header.
+    assert!(log.contains("forbidden=14 malformed=1"), "{log}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -21,6 +21,12 @@ Across machines, each with its certificate:
   horma worker --master 10.0.0.1:7171 --bind 0.0.0.0:0 --tls-ca ca.pem ...     on every other
   horma submit job.toml --master 10.0.0.1:7171 -o out --tls-ca ca.pem ...
 
+A master that serves, and forgets nothing when it is killed:
+  horma master --store jobs             keeps queue, finished extents and results in jobs/
+  horma submit job.toml --detach        prints the job's number; HORMA_MASTER says where
+  horma status                          how far everything is
+  horma fetch 1 job.toml -o out --wait  the same files as `horma run`
+
 Lengths are in mm, angles in degrees. Flags go over HORMA_* variables, these over the job file.
 
 Exit codes: 0 done, 2 the input is wrong, 3 the job cannot be done, 4 the cluster failed,
@@ -53,6 +59,16 @@ pub(crate) enum Command {
     Run(Run),
     /// Send a job to a running master, and fetch its path
     Submit(Submit),
+    /// Tell how far the jobs of a master are
+    Status(Status),
+    /// End a job of a master
+    Cancel(Cancel),
+    /// Fetch the path of a job that was sent to a master before
+    ///
+    /// Given the job file as well, with what was said differently then, it does all that `horma run`
+    /// does with a path; without, it writes path.csv and report.json. The master drops the result once
+    /// it is written, unless it is to keep it.
+    Fetch(Fetch),
     /// Hold a path against the designed surface: gouges, excess, scallops
     Verify(Verify),
     /// Serve as a master: workers register, clients submit jobs
@@ -92,6 +108,9 @@ pub(crate) enum Command {
 pub(crate) struct Run {
     #[command(flatten)]
     pub job: Job,
+    /// Directory for path.csv, path.ngc, report.json and preview.png
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
     /// Worker processes on this machine; 0 computes in this process
     #[arg(short, long, value_name = "N", env = "HORMA_WORKERS")]
     pub workers: Option<u32>,
@@ -131,11 +150,72 @@ pub(crate) struct Verify {
 pub(crate) struct Submit {
     #[command(flatten)]
     pub job: Job,
+    /// Directory for path.csv, path.ngc, report.json and preview.png
+    #[arg(short, long, value_name = "DIR", required_unless_present = "detach")]
+    pub output: Option<PathBuf>,
+    /// Print the job's number and do not wait: `horma status` and `horma fetch` take it, also after
+    /// the master was started anew on the same store
+    #[arg(short, long, conflicts_with = "output")]
+    pub detach: bool,
+    #[command(flatten)]
+    pub remote: Remote,
+}
+
+/// A master elsewhere.
+#[derive(Debug, Args)]
+pub(crate) struct Remote {
     /// Where the master listens
     #[arg(long, value_name = "HOST:PORT", env = "HORMA_MASTER")]
     pub master: String,
+    /// How long to look for the master when it has gone in the middle, seconds
+    #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
+    pub patience: u64,
     #[command(flatten)]
     pub tls: Tls,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Status {
+    /// The job's number [default: all jobs]
+    #[arg(value_name = "ID")]
+    pub id: Option<u64>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub remote: Remote,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Cancel {
+    /// The job's number
+    #[arg(value_name = "ID")]
+    pub id: u64,
+    #[command(flatten)]
+    pub remote: Remote,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Fetch {
+    /// The job's number
+    #[arg(value_name = "ID")]
+    pub id: u64,
+    /// The job file (TOML): with it also path.ngc, preview.png and the verification
+    #[arg(value_name = "JOB")]
+    pub file: Option<PathBuf>,
+    /// Directory for the results
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Wait until the job is over
+    #[arg(short, long)]
+    pub wait: bool,
+    /// Leave the result with the master
+    #[arg(long)]
+    pub keep: bool,
+    #[command(flatten)]
+    pub remote: Remote,
+    #[command(flatten)]
+    pub how: How,
 }
 
 /// What proves who is who. With it all traffic is encrypted, and both ends of every connection show a
@@ -168,15 +248,19 @@ pub(crate) struct Certs {
     pub name: Vec<String>,
 }
 
-/// A job, where its results go, and what it says differently this time.
+/// A job, and what it says differently this time.
 #[derive(Debug, Args)]
 pub(crate) struct Job {
     /// The job file (TOML)
     #[arg(value_name = "JOB")]
     pub file: PathBuf,
-    /// Directory for path.csv, path.ngc, report.json and preview.png
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
+    #[command(flatten)]
+    pub how: How,
+}
+
+/// How a job is done differently from what its file says.
+#[derive(Debug, Args)]
+pub(crate) struct How {
     /// Show nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
@@ -300,7 +384,7 @@ pub(crate) struct Job {
     pub extents_per_worker: Option<u32>,
 }
 
-impl Job {
+impl How {
     /// What goes over the job file.
     pub fn overrides(&self, workers: Option<u32>) -> Overrides {
         Overrides {
@@ -498,6 +582,18 @@ pub(crate) struct Master {
     /// How long a job waits for workers when there is none, seconds
     #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
     pub patience: u64,
+    /// Directory of what must survive this process: queue, finished extents and results. A master that
+    /// is started on it again goes on where the last one was killed [default: all in memory, and lost]
+    #[arg(long, value_name = "DIR", env = "HORMA_STORE")]
+    pub store: Option<PathBuf>,
+    #[command(flatten)]
+    pub limits: Limits,
+}
+
+/// How much a master takes upon itself.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Limits, beyond which it refuses")]
+pub(crate) struct Limits {
     /// Largest part that a client may send, MB
     #[arg(
         long,
@@ -506,6 +602,18 @@ pub(crate) struct Master {
         default_value_t = 1024
     )]
     pub max_part: u64,
+    /// Jobs that wait or are under way
+    #[arg(long, value_name = "N", env = "HORMA_MAX_JOBS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_jobs: u32,
+    /// Jobs under way at once; fewer if they do not fit into memory together
+    #[arg(long, value_name = "N", env = "HORMA_MAX_RUNNING", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_running: u32,
+    /// Results that are kept until they are fetched, MB; beyond that the oldest are dropped
+    #[arg(long, value_name = "MB", env = "HORMA_KEEP_MB", default_value_t = 1024)]
+    pub keep_mb: u64,
+    /// How long they are kept, hours
+    #[arg(long, value_name = "H", env = "HORMA_KEEP_HOURS", default_value_t = 24)]
+    pub keep_hours: u64,
 }
 
 #[derive(Debug, Args)]

@@ -60,15 +60,15 @@ pub(crate) async fn start(workers: u32, threads: usize, simd: Simd) -> Result<Lo
         lease: Duration::from_secs(10),
         patience: START,
         regroup: REGROUP,
-        max_part: 0,
         memory: system::memory(),
         // Master and workers talk within this machine.
         tls: None,
         workers_here: true,
+        clients: None,
     };
     let shutdown = CancellationToken::new();
     let stopped = shutdown.clone().drop_guard();
-    let (master, _serving) = horma_master::start(listener, config, shutdown);
+    let (master, _serving) = horma_master::start(listener, config, shutdown)?;
     // Each child belongs to a task that waits for its end; dropping the set kills them all.
     let mut children = JoinSet::new();
     let mut numbers = Vec::new();

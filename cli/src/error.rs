@@ -54,6 +54,8 @@ pub(crate) enum Error {
     Address { address: String },
     #[error("the master at {address} refused the job: {reason}")]
     Refused { address: String, reason: String },
+    #[error("{reason} (said the master at {address})")]
+    NoSuchJob { address: String, reason: String },
     #[error("the master at {address} cannot do the job: {reason}")]
     Impossible { address: String, reason: String },
     #[error("the master at {address} could not do the job: {reason}")]
@@ -109,6 +111,9 @@ impl Error {
             | Self::Gouge { .. }
             | Self::MotionGouge { .. } => 3,
             Self::Master(horma_master::Error::Plan(e)) => of_core(e),
+            Self::Master(
+                horma_master::Error::StoreUnusable { .. } | horma_master::Error::StoreFormat { .. },
+            ) => 2,
             Self::Formats(_)
             | Self::Bind { .. }
             | Self::Exposed { .. }
@@ -119,6 +124,7 @@ impl Error {
             | Self::Untrusted { .. }
             | Self::Address { .. }
             | Self::Refused { .. }
+            | Self::NoSuchJob { .. }
             | Self::OneProcess
             | Self::Worker(
                 horma_worker::Error::Address { .. }

@@ -7,8 +7,10 @@ mod error;
 
 mod run;
 
+mod client;
 mod cluster;
 mod here;
+mod jobs;
 mod submit;
 mod tls;
 mod verify;
@@ -69,6 +71,9 @@ fn execute(arguments: Arguments) -> Result<()> {
     match arguments.command {
         Command::Run(run) => run::run(&run),
         Command::Submit(submit) => run::submit(&submit),
+        Command::Status(args) => jobs::status(&args),
+        Command::Cancel(args) => jobs::cancel(&args),
+        Command::Fetch(args) => run::fetch(args),
         Command::Verify(args) => verify::verify(&args),
         Command::Master(master) => serve::master(&master),
         Command::Worker(worker) => serve::worker(worker),

@@ -7,7 +7,7 @@ use std::thread;
 use std::time::Instant;
 
 use horma_core::{Counters, Method, Part, Phase, Position, Simd, ToolPath, Verification, place};
-use horma_formats::job::{self, JobFile};
+use horma_formats::job::{self, JobFile, Overrides};
 use horma_formats::output::Staging;
 use horma_formats::report::{self, PathStatistics, Report};
 use horma_formats::{csv, gcode, output, part, preview};
@@ -15,16 +15,24 @@ use horma_master::{Outcome, Progress};
 use horma_proto::VERSION;
 use tokio_util::sync::CancellationToken;
 
-use crate::args;
+use crate::args::{self, How};
+use crate::client::Remote;
 use crate::error::{Error, Result};
 use crate::progress::Display;
 use crate::serve::{NOTICE, runtime};
-use crate::{cluster, here, say, submit, system, tls, verify};
+use crate::{cluster, here, say, submit, system, verify};
+
+/// A job and where its results go.
+struct Asked<'a> {
+    file: &'a Path,
+    how: &'a How,
+    output: &'a Path,
+}
 
 /// Computes a job in this process or on local workers.
 pub(crate) fn run(args: &args::Run) -> Result<()> {
     perform(
-        &args.job,
+        &asked(&args.job, &args.output),
         args.workers,
         args.threads.map(usize::from),
         async |part, file, display, stop| {
@@ -34,35 +42,168 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
             let sharing = file.cluster.sharing;
             if workers == 0 {
                 let threads = threads.unwrap_or_else(system::cores);
-                let run = move || here::run(&part, job, threads, simd, &display, &stop);
+                let stopped = stop.clone();
+                let run = move || here::run(&part, job, threads, simd, &display, &stopped);
                 let run = tokio::task::spawn_blocking(run);
-                return run.await.unwrap_or(Err(Error::Interrupted));
+                return unless(stop, async { run.await.unwrap_or(Err(Error::Interrupted)) }).await;
             }
             let progress = progress(display);
             let threads = threads.unwrap_or(1);
-            cluster::run(part, job, sharing, workers, threads, simd, progress).await
+            let run = cluster::run(part, job, sharing, workers, threads, simd, progress);
+            // Dropping it stops the workers.
+            unless(stop, run).await
         },
     )
 }
 
-/// Has a job computed by a master elsewhere.
+/// Has a job computed by a master elsewhere, and waits for it unless it is told not to.
 pub(crate) fn submit(args: &args::Submit) -> Result<()> {
-    let tls = tls::load(&args.tls)?;
-    perform(&args.job, None, None, async |part, file, display, _| {
-        if let Method::Local(local) = file.job.method
-            && local.needs_whole_path()
-        {
-            return Err(Error::OneProcess);
-        }
-        let sharing = file.cluster.sharing;
-        let (job, progress) = (file.job, progress(display));
-        submit::run(part, job, sharing, &args.master, tls.as_ref(), progress).await
-    })
+    let remote = Remote::of(&args.remote)?;
+    let Some(output) = &args.output else {
+        return detach(&args.job, &remote);
+    };
+    let mut sent = None;
+    perform(
+        &asked(&args.job, output),
+        None,
+        None,
+        async |part, file, display, stop| {
+            display.tell("send", 0, 0);
+            let name = name_of(&args.job.file);
+            let sharing = file.cluster.sharing;
+            check_divisible(file)?;
+            let sending = submit::send(&remote, &part, file.job, sharing, &name);
+            let id = *sent.insert(unless(stop.clone(), sending).await?);
+            let progress = progress(display);
+            let fetched = unless(stop, submit::fetch(&remote, id, true, &progress)).await;
+            if let Err(Error::Interrupted) = fetched {
+                // If that does not reach the master, the job is merely done in vain.
+                let _ = submit::cancel(&remote, id).await;
+            }
+            fetched
+        },
+    )?;
+    leave(&remote, sent)
 }
 
-/// Reads a job, has it computed, and writes its results; stops when it is interrupted.
+fn asked<'a>(job: &'a args::Job, output: &'a Path) -> Asked<'a> {
+    let args::Job { file, how } = job;
+    Asked { file, how, output }
+}
+
+/// Sends a job and prints its number.
+fn detach(args: &args::Job, remote: &Remote) -> Result<()> {
+    let (part, file, _) = read(&args.file, &args.how.overrides(None))?;
+    check_divisible(&file)?;
+    let (name, sharing) = (name_of(&args.file), file.cluster.sharing);
+    let sending = submit::send(remote, &part, file.job, sharing, &name);
+    let id = runtime()?.block_on(sending)?;
+    say(&id.to_string());
+    Ok(())
+}
+
+/// Fetches what has come of a job that was sent before.
+pub(crate) fn fetch(args: args::Fetch) -> Result<()> {
+    let remote = Remote::of(&args.remote)?;
+    let (id, wait, output) = (args.id, args.wait, args.output);
+    match args.file {
+        Some(file) => {
+            let asked = Asked {
+                file: &file,
+                how: &args.how,
+                output: &output,
+            };
+            perform(&asked, None, None, async |_, _, display, stop| {
+                let progress = progress(display);
+                unless(stop, submit::fetch(&remote, id, wait, &progress)).await
+            })?;
+        }
+        None => fetch_alone(&remote, id, wait, &output, args.how.quiet)?,
+    }
+    if args.keep {
+        return Ok(());
+    }
+    leave(&remote, Some(id))
+}
+
+/// Fetches a path about whose part and machine nothing is known here.
+fn fetch_alone(remote: &Remote, id: u64, wait: bool, output: &Path, quiet: bool) -> Result<()> {
+    let runtime = runtime()?;
+    output::prepare_dir(output)?;
+    let display = Display::new(quiet);
+    let progress = progress(display.clone());
+    let fetched = runtime.block_on(async {
+        tokio::select! {
+            () = system::interrupted() => Err(Error::Interrupted),
+            fetched = submit::fetch(remote, id, wait, &progress) => fetched,
+        }
+    });
+    display.finish();
+    let (path, record) = fetched?;
+    let report = Report {
+        version: VERSION.to_owned(),
+        job: serde_json::Value::Null,
+        warnings: Vec::new(),
+        path: PathStatistics::of(&path, &record.counters),
+        verification: None,
+        record,
+    };
+    let staging = Staging::begin(output)?;
+    csv::save(&staging.file(output::PATH), &path)?;
+    report::save(&staging.file(output::REPORT), &report)?;
+    staging.publish()?;
+    if !quiet {
+        say(&output.join(output::PATH).display().to_string());
+    }
+    Ok(())
+}
+
+/// Lets the master drop a result that is written.
+fn leave(remote: &Remote, job: Option<u64>) -> Result<()> {
+    let Some(job) = job else {
+        return Ok(());
+    };
+    // The result is here; the master drops its own when it is old, if it does not hear of this.
+    let _ = runtime()?.block_on(submit::discard(remote, job));
+    Ok(())
+}
+
+/// A job whose positions depend on those before them is not for several workers.
+fn check_divisible(file: &JobFile) -> Result<()> {
+    match file.job.method {
+        Method::Local(local) if local.needs_whole_path() => Err(Error::OneProcess),
+        _ => Ok(()),
+    }
+}
+
+/// What a job is called at a master.
+fn name_of(file: &Path) -> String {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    name.chars().take(64).collect()
+}
+
+/// What comes of `work`, unless it is to stop.
+async fn unless<T>(stop: CancellationToken, work: impl Future<Output = Result<T>>) -> Result<T> {
+    tokio::select! {
+        biased;
+        () = stop.cancelled() => Err(Error::Interrupted),
+        done = work => done,
+    }
+}
+
+/// A job with its part in place, and what there is to warn of.
+fn read(file: &Path, overrides: &Overrides) -> Result<(Part, JobFile, Vec<String>)> {
+    let file = job::read(file, overrides)?;
+    let (part, warnings) = part::read_all(&file.files)?;
+    let part = place(part, file.axis)?;
+    let warnings = warnings.iter().map(ToString::to_string).collect();
+    Ok((part, file, warnings))
+}
+
+/// Reads a job, has it computed, and writes its results; stops when it is interrupted, as does what
+/// computes.
 fn perform(
-    args: &args::Job,
+    asked: &Asked,
     workers: Option<u32>,
     threads: Option<usize>,
     compute: impl AsyncFnOnce(Part, &JobFile, Display, CancellationToken) -> Result<Outcome>,
@@ -74,27 +215,20 @@ fn perform(
         system::interrupted().await;
         stopping.cancel();
     });
-    let display = Display::new(args.quiet);
+    let display = Display::new(asked.how.quiet);
     let performed = runtime.block_on(async {
-        let file = job::read(&args.file, &args.overrides(workers))?;
-        output::prepare_dir(&args.output)?;
         display.tell("read", 0, 0);
         let begin = Instant::now();
-        let (part, warnings) = part::read_all(&file.files)?;
-        let part = place(part, file.axis)?;
+        let (part, file, warnings) = read(asked.file, &asked.how.overrides(workers))?;
+        output::prepare_dir(asked.output)?;
         let read = phase("read", begin);
-        let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
         for warning in &warnings {
             display.note(&format!("warning: {warning}"));
         }
-        let (path, mut record) = tokio::select! {
-            biased;
-            // Dropping the computation stops whatever it started.
-            () = stop.cancelled() => return Err(Error::Interrupted),
-            outcome = compute(part.clone(), &file, display.clone(), stop.clone()) => outcome?,
-        };
+        let computing = compute(part.clone(), &file, display.clone(), stop.clone());
+        let (path, mut record) = computing.await?;
         record.phases.insert(0, read);
-        let verification = if args.no_verify {
+        let verification = if asked.how.no_verify {
             None
         } else {
             display.tell("verify", 0, 0);
@@ -116,14 +250,14 @@ fn perform(
             verification,
             record,
         };
-        write(args, &file, &part, &path, report, &display, &stop)
+        write(asked, &file, &part, &path, report, &display, &stop)
     });
     // Before anything else is said, and also if nothing good came of it.
     display.finish();
     runtime.shutdown_timeout(NOTICE);
     let report = performed?;
-    if !args.quiet {
-        summarize(&args.output, &report);
+    if !asked.how.quiet {
+        summarize(asked.output, &report);
     }
     Ok(())
 }
@@ -147,7 +281,7 @@ async fn verified(
 
 /// Writes all results, or none.
 fn write(
-    args: &args::Job,
+    asked: &Asked,
     file: &JobFile,
     part: &Part,
     path: &ToolPath,
@@ -164,9 +298,9 @@ fn write(
             Ok(())
         }
     };
-    let staging = Staging::begin(&args.output)?;
+    let staging = Staging::begin(asked.output)?;
     let heading = [
-        ("job", &*args.file.to_string_lossy()),
+        ("job", &*asked.file.to_string_lossy()),
         ("cutter", &described(&report.job["cutter"])),
     ];
     // The picture takes about as long as the rest.

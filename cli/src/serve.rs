@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use horma_core::Simd;
-use horma_master::Config;
+use horma_master::{Clients, Config, Limits};
 use horma_proto::Role;
 use horma_worker::Rendezvous;
 use tokio::net::TcpListener;
@@ -29,10 +29,19 @@ pub(crate) fn master(args: &Master) -> Result<()> {
         lease: Duration::from_secs(args.lease),
         patience: Duration::from_secs(args.patience),
         regroup: Duration::from_secs(args.patience),
-        max_part: args.max_part.saturating_mul(1_000_000),
         memory: system::memory(),
         tls,
         workers_here: false,
+        clients: Some(Clients {
+            store: args.store.clone(),
+            limits: Limits {
+                part: args.limits.max_part.saturating_mul(1_000_000),
+                queue: args.limits.max_jobs as usize,
+                running: args.limits.max_running as usize,
+                keep_bytes: args.limits.keep_mb.saturating_mul(1_000_000),
+                keep: Duration::from_secs(args.limits.keep_hours.saturating_mul(3600)),
+            },
+        }),
     };
     serve(async {
         let (listener, bound) = listen(&args.bind, trusted).await?;
@@ -42,7 +51,7 @@ pub(crate) fn master(args: &Master) -> Result<()> {
             .map(|f| reach::publish(f, &address))
             .transpose()?;
         let shutdown = CancellationToken::new();
-        let (_master, serving) = horma_master::start(listener, config, shutdown.clone());
+        let (_master, serving) = horma_master::start(listener, config, shutdown.clone())?;
         let mut serving = std::pin::pin!(serving);
         tokio::select! {
             served = &mut serving => return served.map_or(Ok(()), |s| Ok(s?)),

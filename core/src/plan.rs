@@ -104,6 +104,23 @@ pub enum Stock {
 }
 
 impl Handout {
+    /// Bytes of memory that the master of a job needs for it, as far as that is known beforehand; for
+    /// positions to be inserted there has to be some more.
+    ///
+    /// # Errors
+    /// Those of [`Handout::new`], before anything large is tried.
+    pub fn predict(
+        part: &Part,
+        job: &Job,
+        distribution: Distribution,
+        memory: u64,
+        workers_here: bool,
+    ) -> Result<u64> {
+        let point_bytes = point_bytes(part, distribution, workers_here)?;
+        let (_, needed) = lay_out(part, job, memory, point_bytes)?;
+        Ok(needed as u64)
+    }
+
     /// Plans as [`Plan::new`] does. If the workers make the rows themselves, each is made here only
     /// for its outline, and dropped; their memory counts if it is the same, `workers_here`.
     ///
@@ -130,10 +147,7 @@ impl Handout {
                 })
             }
             Distribution::Surface => {
-                if let Some(name) = mesh(part) {
-                    return Err(Error::SurfaceNeedsSurfaces { name });
-                }
-                let point_bytes = if workers_here { POINT_BYTES } else { 0.0 };
+                let point_bytes = point_bytes(part, sharing.distribution, workers_here)?;
                 let (layout, needed) = lay_out(part, &job, memory, point_bytes)?;
                 let survey = survey(&layout, drop);
                 Ok(Self {
@@ -183,6 +197,18 @@ impl Handout {
                 interior_first(&self.trajectory, &self.outlines, &self.job, extent)
             }
         }
+    }
+}
+
+/// Memory of this machine for each point, by who makes it.
+fn point_bytes(part: &Part, distribution: Distribution, workers_here: bool) -> Result<f64> {
+    if distribution != Distribution::Surface {
+        return Ok(POINT_BYTES);
+    }
+    match mesh(part) {
+        Some(name) => Err(Error::SurfaceNeedsSurfaces { name }),
+        None if workers_here => Ok(POINT_BYTES),
+        None => Ok(0.0),
     }
 }
 

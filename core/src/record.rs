@@ -22,6 +22,8 @@ pub struct Record {
     pub workers: Vec<WorkerRecord>,
     /// Each extent as it was delivered, in order.
     pub extents: Vec<ExtentRecord>,
+    /// How many of these had been delivered before the master was last started.
+    pub extents_from_journal: u32,
     /// Attempts that came to nothing and were made again.
     pub lost: Vec<LostAttempt>,
     /// Attempts by idle workers at what others were at or were to do later.

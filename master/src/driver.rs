@@ -8,34 +8,25 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use horma_core::{ExtentRecord, Handout, Job, Part, Phase, Record, Sharing, SubTrajectory, stitch};
+use horma_core::{ExtentRecord, Handout};
 use horma_proto::TaskId;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
 use crate::dispatch::{Undelivered, dispatch};
-use crate::error::{Error, Result};
+use crate::error::Error;
+use crate::journal::Resumed;
 use crate::place::{Placed, place};
-use crate::running::RunningJob;
+use crate::running::{Reply, RunningJob};
 use crate::state::{Command, Event, Fault, Held, State, Step, apply};
-use crate::{Config, Outcome, Progress};
+use crate::{Config, Progress};
 
 /// Messages that may wait for the driver.
 const INBOX: usize = 256;
 
 /// How often it looks who is silent, who is late, and who has hung up.
 const TICK: Duration = Duration::from_millis(250);
-
-/// A handle to a running master.
-#[derive(Debug, Clone)]
-pub struct Master {
-    inbox: mpsc::Sender<Message>,
-    workers: watch::Receiver<usize>,
-    config: Config,
-    /// New each time a master starts: it counts its jobs anew.
-    pub(crate) incarnation: u64,
-}
 
 /// The jobs that are going on, and the number of the next one.
 pub(crate) struct Going {
@@ -61,124 +52,46 @@ pub(crate) enum Message {
     Run {
         plan: Arc<Handout>,
         workers: u32,
+        /// What there is of it already, if it has a journal.
+        resumed: Option<Resumed>,
         progress: Progress,
-        reply: oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>,
+        reply: Reply,
     },
     Over {
         worker: String,
         task: TaskId,
-        outcome: std::result::Result<ExtentRecord, Undelivered>,
+        outcome: Result<ExtentRecord, Undelivered>,
     },
     /// Rows are placed, or not.
     Placed {
         worker: String,
         task: TaskId,
-        outcome: std::result::Result<Placed, Fault>,
+        outcome: Result<Placed, Fault>,
     },
 }
 
-impl Master {
-    pub(crate) fn start(config: Config, shutdown: CancellationToken) -> Self {
-        let (inbox, messages) = mpsc::channel(INBOX);
-        let (count, workers) = watch::channel(0);
-        let incarnation = incarnation();
-        let driver = Driver {
-            config: config.clone(),
-            begin: Instant::now(),
-            state: State::new(config.lease, config.regroup),
-            addresses: BTreeMap::new(),
-            jobs: BTreeMap::new(),
-            next_job: 1,
-            incarnation,
-            inbox: inbox.downgrade(),
-            count,
-        };
-        tokio::spawn(driver.run(messages, shutdown));
-        Self {
-            inbox,
-            workers,
-            config,
-            incarnation,
-        }
-    }
-
-    /// Number of workers, as it changes.
-    pub fn workers(&self) -> watch::Receiver<usize> {
-        self.workers.clone()
-    }
-
-    /// Runs a job on the workers there are, after waiting for `at_least` of them to register, or for
-    /// as long as the master's patience lasts.
-    /// Dropping the future cancels the job.
-    ///
-    /// # Errors
-    /// [`Error::Plan`] if the job cannot be done at all, [`Error::NoWorkers`] if nobody comes in
-    /// time, and whatever made it fail on the cluster.
-    pub async fn run(
-        &self,
-        part: Part,
-        job: Job,
-        sharing: Sharing,
-        at_least: usize,
-        progress: Progress,
-    ) -> Result<Outcome> {
-        let begin = Instant::now();
-        progress("discretize", 0, 0);
-        let plan = Arc::new(crate::plan(part, job, sharing, &self.config).await?);
-        let discretized = begin.elapsed();
-        let workers = self.gather(at_least.max(1)).await?;
-
-        let begin = Instant::now();
-        let (reply, outcome) = oneshot::channel();
-        let message = Message::Run {
-            plan: plan.clone(),
-            workers,
-            progress: progress.clone(),
-            reply,
-        };
-        self.tell(message).await?;
-        let (parts, mut record) = outcome.await.map_err(|_| Error::Interrupted)??;
-        let digitized = begin.elapsed();
-
-        progress("stitch", 0, 0);
-        let begin = Instant::now();
-        let path = stitch(plan.trajectory, parts).map_err(Error::Stitch)?;
-        let stitched = begin.elapsed();
-        record.phases = [
-            ("discretize", discretized),
-            ("digitize", digitized),
-            ("stitch", stitched),
-        ]
-        .map(|(name, time)| Phase {
-            name: name.to_owned(),
-            seconds: time.as_secs_f64(),
-        })
-        .into();
-        record.bodies.clone_from(&plan.bodies);
-        Ok((path, record))
-    }
-
-    /// Waits until enough workers are there; returns how many.
-    async fn gather(&self, at_least: usize) -> Result<u32> {
-        let mut workers = self.workers.clone();
-        let enough = workers.wait_for(|&n| n >= at_least);
-        match tokio::time::timeout(self.config.patience, enough).await {
-            Ok(Ok(count)) => Ok(*count as u32),
-            Ok(Err(_)) => Err(Error::Interrupted),
-            // Those who came can do it.
-            Err(_) if *self.workers.borrow() > 0 => Ok(*self.workers.borrow() as u32),
-            Err(_) => Err(Error::NoWorkers {
-                seconds: self.config.patience.as_secs(),
-            }),
-        }
-    }
-
-    pub(crate) async fn tell(&self, message: Message) -> Result<()> {
-        self.inbox
-            .send(message)
-            .await
-            .map_err(|_| Error::Interrupted)
-    }
+/// Starts a driver, until the shutdown; returns where it is told things, the number of workers as it
+/// changes, and which start of a master this is.
+pub(crate) fn start(
+    config: Config,
+    shutdown: CancellationToken,
+) -> (mpsc::Sender<Message>, watch::Receiver<usize>, u64) {
+    let (inbox, messages) = mpsc::channel(INBOX);
+    let (count, workers) = watch::channel(0);
+    let incarnation = incarnation();
+    let driver = Driver {
+        begin: Instant::now(),
+        state: State::new(config.lease, config.regroup),
+        config,
+        addresses: BTreeMap::new(),
+        jobs: BTreeMap::new(),
+        next_job: 1,
+        incarnation,
+        inbox: inbox.downgrade(),
+        count,
+    };
+    tokio::spawn(driver.run(messages, shutdown));
+    (inbox, workers, incarnation)
 }
 
 /// A number that no earlier start of a master had.
@@ -288,25 +201,28 @@ impl Driver {
             Message::Run {
                 plan,
                 workers,
+                resumed,
                 progress,
                 reply,
             } => {
-                let job = self.next_job;
-                self.next_job += 1;
-                let running = RunningJob::new(plan, workers, progress, reply);
+                // A job that is kept has its number already; such jobs begin in their order.
+                let number = resumed.as_ref().map(|r| r.journal.job);
+                let job = number.unwrap_or(self.next_job);
+                self.next_job = self.next_job.max(job) + 1;
+                let running = RunningJob::new(plan, workers, resumed, progress, reply);
                 let (extents, halos) = (running.extents.len() as u32, running.halos());
+                let done = running.kept.keys().copied().collect();
                 let positions = running.plan.trajectory.positions;
                 info!(job, extents, positions, "job");
-                (running.progress)("digitize", 0, positions);
+                running.tell_progress();
                 self.jobs.insert(job, running);
-                self.apply(
-                    Event::Submitted {
-                        job,
-                        extents,
-                        halos,
-                    },
-                    None,
-                );
+                let submitted = Event::Submitted {
+                    job,
+                    extents,
+                    halos,
+                    done,
+                };
+                self.apply(submitted, None);
             }
             Message::Over {
                 worker,
@@ -322,12 +238,7 @@ impl Driver {
     }
 
     /// Rows are placed, or not.
-    fn placed(
-        &mut self,
-        worker: String,
-        task: TaskId,
-        outcome: std::result::Result<Placed, Fault>,
-    ) {
+    fn placed(&mut self, worker: String, task: TaskId, outcome: Result<Placed, Fault>) {
         let Some(job) = self.jobs.get_mut(&task.job) else {
             return;
         };
@@ -354,12 +265,7 @@ impl Driver {
     }
 
     /// A call is over, well or not.
-    fn over(
-        &mut self,
-        worker: String,
-        task: TaskId,
-        outcome: std::result::Result<ExtentRecord, Undelivered>,
-    ) {
+    fn over(&mut self, worker: String, task: TaskId, outcome: Result<ExtentRecord, Undelivered>) {
         let Some(job) = self.jobs.get_mut(&task.job) else {
             return;
         };

@@ -1,5 +1,6 @@
 //! Why a job or a master fails.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Everything that ends a job or a master.
@@ -44,6 +45,30 @@ pub enum Error {
     /// The master is stopping.
     #[error("the master was stopped before the job was done")]
     Interrupted,
+    /// The store cannot be opened.
+    #[error("the store {} cannot be used: {reason}", file.display())]
+    StoreUnusable {
+        /// Its file.
+        file: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The store was written by another horma.
+    #[error(
+        "the store has format {found} and this horma wants {ours}; give an empty directory, or run the horma that wrote it"
+    )]
+    StoreFormat {
+        /// The store's.
+        found: u64,
+        /// This program's.
+        ours: u64,
+    },
+    /// What is in the store is not what was put there.
+    #[error("the store is damaged: {0}")]
+    StoreDamaged(String),
+    /// The store cannot be read or written.
+    #[error("the store cannot be read or written: {0}")]
+    Store(Arc<redb::Error>),
     /// The server stopped.
     #[error("cannot serve: {0}")]
     Serve(Arc<tonic::transport::Error>),
@@ -51,6 +76,25 @@ pub enum Error {
 
 /// The result of a job or of a master's life.
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// Everything that the store's library calls an error.
+macro_rules! from_store {
+    ($($error:ident),*) => {$(
+        impl From<redb::$error> for Error {
+            fn from(error: redb::$error) -> Self {
+                Self::Store(Arc::new(error.into()))
+            }
+        }
+    )*};
+}
+
+from_store!(
+    DatabaseError,
+    TransactionError,
+    TableError,
+    StorageError,
+    CommitError
+);
 
 impl From<Error> for horma_proto::Error {
     fn from(error: Error) -> Self {

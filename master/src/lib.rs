@@ -1,13 +1,22 @@
 //! The master: it splits a job into extents, schedules them on workers, and stitches the path.
 //!
-//! `state` decides and touches nothing; `driver` owns it, feeds it events and carries out its
-//! commands; `place` brings rows to the worker that holds them, `dispatch` one task to one worker and
-//! its positions back; `service` is what workers and clients see. The master digitizes nothing itself and
-//! reads no file.
+//! `service` is what workers and clients see. `desk` has the jobs of clients, with what must not be
+//! forgotten in the `store`; `run` takes one job from its plan to its path. `state` decides and touches
+//! nothing; `driver` owns it, feeds it events and carries out its commands; `place` brings rows to the
+//! worker that holds them, `dispatch` one task to one worker and its positions back. The master digitizes
+//! nothing itself, and the store is the only file it knows.
 
 mod error;
 
 mod service;
+mod submission;
+
+mod desk;
+mod journal;
+mod result;
+mod store;
+
+mod run;
 
 mod driver;
 mod running;
@@ -17,18 +26,22 @@ mod dispatch;
 mod place;
 mod received;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use horma_core::{Handout, Job, Part, Record, Sharing, ToolPath};
+use horma_core::{Record, ToolPath};
 use horma_proto::wire::master_server::MasterServer;
 use horma_proto::{Guard, MAX_MESSAGE, Tls, transport};
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
-pub use driver::Master;
+use desk::Desk;
+use store::Store;
+
 pub use error::{Error, Result};
+pub use run::Master;
 
 /// What a master has to know.
 #[derive(Debug, Clone)]
@@ -43,12 +56,36 @@ pub struct Config {
     pub patience: Duration,
     /// How long it waits for one to come back when all are lost.
     pub regroup: Duration,
-    /// Largest part that a client may send, bytes on the wire.
-    pub max_part: u64,
-    /// Memory that one job may take, bytes.
+    /// Memory that jobs may take together, bytes.
     pub memory: u64,
     /// Whether workers share that memory.
     pub workers_here: bool,
+    /// What clients may do; nothing if there is nothing here.
+    pub clients: Option<Clients>,
+}
+
+/// What a master that serves clients has to know.
+#[derive(Debug, Clone)]
+pub struct Clients {
+    /// Directory of what must survive the master; without it all is in memory.
+    pub store: Option<PathBuf>,
+    /// How much of everything there may be.
+    pub limits: Limits,
+}
+
+/// How much a master that serves clients takes upon itself.
+#[derive(Debug, Clone)]
+pub struct Limits {
+    /// Largest part that a client may send, bytes on the wire.
+    pub part: u64,
+    /// Jobs that are not over.
+    pub queue: usize,
+    /// Jobs at once at the workers.
+    pub running: usize,
+    /// Results that are kept, bytes.
+    pub keep_bytes: u64,
+    /// How long they are kept.
+    pub keep: Duration,
 }
 
 /// A path and how it came about.
@@ -62,19 +99,35 @@ const DRAIN: Duration = Duration::from_secs(5);
 
 /// Starts a master on `listener`. It serves workers and clients until `shutdown`; the handle runs
 /// jobs from within this process.
+///
+/// # Errors
+/// Those of opening the store.
 pub fn start(
     listener: TcpListener,
     config: Config,
     shutdown: CancellationToken,
-) -> (Master, JoinHandle<Result<()>>) {
-    let tls = config.tls.clone();
-    let service = service::Service {
-        max_part: config.max_part,
-        heartbeat: config.heartbeat,
-        guard: Guard::of(tls.as_ref()),
-        master: Master::start(config, shutdown.clone()),
+) -> Result<(Master, JoinHandle<Result<()>>)> {
+    let (tls, clients, heartbeat) = (config.tls.clone(), config.clients.clone(), config.heartbeat);
+    let store = clients
+        .as_ref()
+        .map(|clients| Store::open(clients.store.as_deref()))
+        .transpose()?;
+    let master = Master::start(config, shutdown.clone());
+    let desk = match (store, clients) {
+        (Some(store), Some(Clients { limits, .. })) => {
+            let desk = Desk::open(store, master.clone(), limits, shutdown.clone())?;
+            tokio::spawn(desk.clone().serve());
+            Some(desk)
+        }
+        _ => None,
     };
-    let master = service.master.clone();
+    let service = service::Service {
+        guard: Guard::of(tls.as_ref()),
+        heartbeat,
+        master: master.clone(),
+        desk,
+        shutdown: shutdown.clone(),
+    };
     let service = MasterServer::new(service)
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
@@ -92,20 +145,5 @@ pub fn start(
             Err(_) => Ok(()),
         }
     });
-    (master, serving)
-}
-
-/// Plans a job on a thread of its own: discretizing a part is work.
-pub(crate) async fn plan(
-    part: Part,
-    job: Job,
-    sharing: Sharing,
-    config: &Config,
-) -> Result<Handout> {
-    let (memory, here) = (config.memory, config.workers_here);
-    let plan = move || Handout::new(&part, job, sharing, memory, here);
-    let planned = tokio::task::spawn_blocking(plan).await;
-    planned
-        .map_err(|_| Error::Interrupted)?
-        .map_err(Error::Plan)
+    Ok((master, serving))
 }

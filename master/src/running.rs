@@ -14,11 +14,12 @@ use tokio::sync::oneshot;
 use crate::Progress;
 use crate::dispatch::{Attempt, Coming, needed};
 use crate::error::Result;
+use crate::journal::{Journal, Kept, Resumed};
 use crate::place::{Placed, Placing};
 use crate::state::{Fault, Held};
 
 /// Who waits for a job.
-type Reply = oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>;
+pub(crate) type Reply = oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>;
 
 pub(crate) struct RunningJob {
     pub plan: Arc<Handout>,
@@ -35,7 +36,11 @@ pub(crate) struct RunningJob {
     /// Inserted positions that have arrived.
     pub inserted: Arc<AtomicU64>,
     /// What was delivered and kept, by extent.
-    pub kept: BTreeMap<u32, (Vec<SubTrajectory>, ExtentRecord)>,
+    pub kept: BTreeMap<u32, Kept>,
+    /// Where that is written down, if it is.
+    journal: Option<Journal>,
+    /// How much of it was in the journal already.
+    from_journal: u32,
     /// What placing rows has taken so far, by extent.
     pub placed: BTreeMap<u32, Placed>,
     lost: Vec<LostAttempt>,
@@ -63,23 +68,42 @@ impl Call {
 }
 
 impl RunningJob {
-    /// Splits a plan for so many workers.
-    pub fn new(plan: Arc<Handout>, workers: u32, progress: Progress, reply: Reply) -> Self {
+    /// Splits a plan for so many workers into extents, some of which may be there already.
+    pub fn new(
+        plan: Arc<Handout>,
+        workers: u32,
+        resumed: Option<Resumed>,
+        progress: Progress,
+        reply: Reply,
+    ) -> Self {
         let extents = plan.split(workers);
         let mut users = vec![0; plan.outlines.len()];
         for &row in extents.iter().flat_map(|e| &e.rows) {
             users[row as usize] += 1;
         }
+        let (journal, kept) = resumed.map_or((None, BTreeMap::new()), |resumed| {
+            (Some(resumed.journal), resumed.kept)
+        });
+        let runs = || kept.values().flat_map(|(runs, _)| runs.iter());
+        let arrived: usize = runs().map(|run| run.touches.len()).sum();
+        let inserted: usize = runs().map(|run| run.between.len()).sum();
+        // Of what is there already nothing is to come.
+        let coming = |extent: &Extent| match kept.get(&extent.id) {
+            Some(_) => Arc::default(),
+            None => Arc::new(Coming::of(extent)),
+        };
         Self {
+            coming: extents.iter().map(coming).collect(),
             plan,
-            coming: extents.iter().map(|e| Arc::new(Coming::of(e))).collect(),
             extents,
             rows_sent: BTreeMap::new(),
             users,
             progress,
-            arrived: Arc::default(),
-            inserted: Arc::default(),
-            kept: BTreeMap::new(),
+            arrived: Arc::new(AtomicU64::new(arrived as u64)),
+            inserted: Arc::new(AtomicU64::new(inserted as u64)),
+            from_journal: kept.len() as u32,
+            kept,
+            journal,
             placed: BTreeMap::new(),
             lost: Vec::new(),
             second: Vec::new(),
@@ -195,6 +219,12 @@ impl RunningJob {
         }
     }
 
+    /// Tells whoever waits how far it is.
+    pub fn tell_progress(&self) {
+        let arrived = self.arrived.load(Ordering::Relaxed);
+        (self.progress)("digitize", arrived, self.plan.trajectory.positions);
+    }
+
     /// Writes down an attempt that came to nothing.
     pub fn lose(&mut self, worker: &str, task: TaskId, fault: &Fault, positions_received: u64) {
         self.lost.push(LostAttempt {
@@ -207,7 +237,8 @@ impl RunningJob {
         });
     }
 
-    /// Keeps an extent of which nothing is missing, with the record of the attempt that completed it.
+    /// Keeps an extent of which nothing is missing, with the record of the attempt that completed it, and
+    /// has it written down.
     pub fn keep(&mut self, extent: u32, mut record: ExtentRecord) {
         let coming = &self.coming[extent as usize];
         let received = std::mem::take(&mut *coming.received());
@@ -224,7 +255,11 @@ impl RunningJob {
         record.bytes_sent = placed.bytes + coming.sent.load(Ordering::Relaxed);
         record.bytes_received = coming.bytes.load(Ordering::Relaxed);
         record.place_seconds = placed.seconds;
-        self.kept.insert(extent, (received.into_parts(), record));
+        let kept = (Arc::new(received.into_parts()), record);
+        if let Some(journal) = &self.journal {
+            journal.keep(extent, kept.clone());
+        }
+        self.kept.insert(extent, kept);
     }
 
     /// Hands over what was kept.
@@ -241,7 +276,7 @@ impl RunningJob {
             traffic.bytes_between_workers += record.bytes_fetched;
             traffic.bytes_of_results += record.bytes_received;
             counters += record.counters;
-            parts.extend(positions);
+            parts.extend(Arc::unwrap_or_clone(positions));
             extents.push(record);
         }
         let worker = |(worker, address)| WorkerRecord { worker, address };
@@ -250,6 +285,7 @@ impl RunningJob {
             traffic: Some(traffic),
             workers: self.workers.into_iter().map(worker).collect(),
             extents,
+            extents_from_journal: self.from_journal,
             lost: self.lost,
             second: self.second,
             ..Record::default()

@@ -3,27 +3,32 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use horma_core::{Job, Part, Sharing};
 use horma_proto::wire::master_server::Master as Api;
-use horma_proto::wire::submit_reply::Kind as Reply;
+use horma_proto::wire::path_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
 use horma_proto::wire::{
-    self, HeartbeatReply, HeartbeatRequest, RegisterReply, RegisterRequest, SubmitReply,
-    SubmitRequest,
+    self, CancelReply, CancelRequest, DiscardReply, DiscardRequest, HeartbeatReply,
+    HeartbeatRequest, PathReply, PathRequest, RegisterReply, RegisterRequest, StatusReply,
+    StatusRequest, SubmitReply, SubmitRequest,
 };
-use horma_proto::{Error, Guard, Messages, Role, VERSION};
+use horma_proto::{Error, Guard, Role};
 use tokio::sync::{mpsc, oneshot};
+use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::sync::CancellationToken;
 use tonic::{Request as Call, Response, Status, Streaming};
-use tracing::info;
+use tracing::debug;
 
-use crate::driver::{Going, Master, Message};
-use crate::{Outcome, Progress};
+use crate::desk::{Desk, View};
+use crate::driver::{Going, Message};
+use crate::store::{Gone, Stage};
+use crate::submission::{Arriving, check_version, out_of_order};
+use crate::{Master, result};
 
 /// Replies that may wait for a client.
 const WAITING_REPLIES: usize = 16;
 
-/// How long a client may take to send the next piece of its part.
+/// How long a client may take to send the next piece of its part, or to take one of its path.
 const CLIENT_PATIENCE: Duration = Duration::from_secs(30);
 
 pub(crate) struct Service {
@@ -32,8 +37,10 @@ pub(crate) struct Service {
     pub guard: Guard,
     /// How often a worker is to say that it is alive.
     pub heartbeat: Duration,
-    /// Largest part that a client may send, bytes on the wire.
-    pub max_part: u64,
+    /// The jobs of clients, if there may be any.
+    pub desk: Option<Arc<Desk>>,
+    /// Ends what would go on for long.
+    pub shutdown: CancellationToken,
 }
 
 impl Service {
@@ -48,11 +55,18 @@ impl Service {
         }
         answer.await.map_err(|_| stopping.into())
     }
+
+    /// The desk, for a client.
+    fn desk<T>(&self, call: &Call<T>) -> Result<&Arc<Desk>, Status> {
+        self.guard.admit(call, Role::Client)?;
+        let none = || Status::unimplemented("this master serves no clients");
+        self.desk.as_ref().ok_or_else(none)
+    }
 }
 
 #[tonic::async_trait]
 impl Api for Service {
-    type SubmitStream = ReceiverStream<Result<SubmitReply, Status>>;
+    type FetchStream = ReceiverStream<Result<PathReply, Status>>;
 
     async fn register(
         &self,
@@ -65,7 +79,7 @@ impl Api for Service {
             incarnation,
             address,
         } = call.into_inner();
-        check_version(version)?;
+        check_version(&version)?;
         let name = worker.clone();
         let register = |reply| Message::Register {
             worker,
@@ -106,122 +120,184 @@ impl Api for Service {
     async fn submit(
         &self,
         call: Call<Streaming<SubmitRequest>>,
-    ) -> Result<Response<Self::SubmitStream>, Status> {
-        self.guard.admit(&call, Role::Client)?;
-        let submitted = receive(call.into_inner(), self.max_part).await?;
-        let (part, job, sharing) = submitted;
-        info!(bodies = part.bodies.len(), "submitted");
+    ) -> Result<Response<SubmitReply>, Status> {
+        let desk = self.desk(&call)?;
+        let job = submit(desk, call.into_inner()).await?;
+        Ok(Response::new(SubmitReply { job }))
+    }
+
+    async fn status(&self, call: Call<StatusRequest>) -> Result<Response<StatusReply>, Status> {
+        let desk = self.desk(&call)?;
+        let jobs = desk.status(call.get_ref().job)?;
+        let jobs = jobs.into_iter().map(|(job, view)| status(job, view));
+        let jobs = jobs.collect();
+        Ok(Response::new(StatusReply { jobs }))
+    }
+
+    async fn cancel(&self, call: Call<CancelRequest>) -> Result<Response<CancelReply>, Status> {
+        let desk = self.desk(&call)?;
+        desk.cancel(call.get_ref().job).await?;
+        Ok(Response::new(CancelReply {}))
+    }
+
+    async fn discard(&self, call: Call<DiscardRequest>) -> Result<Response<DiscardReply>, Status> {
+        let desk = self.desk(&call)?;
+        desk.discard(call.get_ref().job).await?;
+        Ok(Response::new(DiscardReply {}))
+    }
+
+    async fn fetch(&self, call: Call<PathRequest>) -> Result<Response<Self::FetchStream>, Status> {
+        let desk = self.desk(&call)?.clone();
+        let PathRequest { job, wait } = call.into_inner();
+        // At once, so that an unknown job is not the end of a stream.
+        drop(desk.watch(job)?);
         let (replies, stream) = mpsc::channel(WAITING_REPLIES);
-        let master = self.master.clone();
+        let shutdown = self.shutdown.clone();
         tokio::spawn(async move {
-            let telling = replies.clone();
-            // Progress that the client is too slow for is dropped: newer follows.
-            let progress: Progress = Arc::new(move |phase, done, total| {
-                let phase = phase.to_owned();
-                let progress = Reply::Progress(wire::Progress { phase, done, total });
-                let _ = telling.try_send(Ok(reply(progress)));
-            });
-            let run = master.run(part, job, sharing, 1, progress);
-            let outcome = tokio::select! {
-                outcome = run => outcome,
-                // The client hung up: dropping the run cancels it.
+            let sent = tokio::select! {
+                sent = fetch(&desk, job, wait, &replies) => sent,
+                () = shutdown.cancelled() => Err(Error::ShuttingDown("the master").into()),
+                // The client hung up.
                 () = replies.closed() => return,
             };
-            match outcome {
-                Ok(outcome) => send(&replies, outcome).await,
-                // The client may have hung up just now.
-                Err(error) => drop(replies.send(Err(Error::from(error).into())).await),
+            if let Err(status) = sent {
+                debug!(job, %status, "not fetched");
+                let _ = replies.send(Err(status)).await;
             }
         });
         Ok(Response::new(ReceiverStream::new(stream)))
     }
 }
 
-fn check_version(theirs: String) -> Result<(), Error> {
-    if theirs == VERSION {
-        Ok(())
-    } else {
-        let ours = VERSION;
-        Err(Error::Version { ours, theirs })
-    }
-}
-
-/// Receives a job and its part.
-async fn receive(
-    mut requests: Streaming<SubmitRequest>,
-    max_part: u64,
-) -> Result<(Part, Job, Sharing), Status> {
-    let mut job = None;
-    let mut part = Part::default();
-    let mut messages = Messages::default();
+/// Receives a job and its part, and has it queued.
+async fn submit(desk: &Arc<Desk>, mut requests: Streaming<SubmitRequest>) -> Result<u64, Status> {
+    let most = desk.limits.part;
+    let mut arriving = Arriving::default();
     let mut bytes = 0;
+    let mut place = None;
     loop {
-        let next = tokio::time::timeout(CLIENT_PATIENCE, requests.message());
-        let next = next.await.map_err(|_| {
-            let seconds = CLIENT_PATIENCE.as_secs();
-            Error::TooSlow { seconds }
-        })?;
-        match (next?.map(|r| r.kind), &job) {
-            (None, _) => break,
-            (Some(Some(Request::Header(header))), None) => {
-                check_version(header.version)?;
-                let sharing = horma_proto::sharing_from_wire(header.sharing.as_ref())?;
-                let header = header.job.ok_or(Error::Missing {
-                    message: "submission",
-                    field: "a job",
-                })?;
-                job = Some((horma_proto::job_from_wire(&header)?, sharing));
+        let seconds = CLIENT_PATIENCE.as_secs();
+        let next = timeout(CLIENT_PATIENCE, requests.message()).await;
+        let next = next.map_err(|_| Error::TooSlow { seconds })??;
+        match next.map(|request| request.kind) {
+            None => break,
+            Some(Some(Request::Header(header))) => {
+                let key = arriving.header(&header)?;
+                // Its answer was lost on the way.
+                if let Some(job) = desk.find(key) {
+                    return Ok(job);
+                }
+                place = Some(desk.place()?);
             }
-            (Some(Some(Request::Bodies(chunk))), Some(_)) => {
+            Some(Some(Request::Bodies(chunk))) => {
                 bytes += chunk.data.len() as u64;
-                if bytes > max_part {
-                    return Err(Error::TooLarge {
-                        bytes: bytes as usize,
-                        limit: max_part as usize,
-                    }
+                if bytes > most {
+                    let mb = most / 1_000_000;
+                    return Err(Error::Limit(format!(
+                        "the part takes more than the {mb} MB that this master takes (--max-part)"
+                    ))
                     .into());
                 }
-                messages.push(&chunk)?;
-                while let Some(body) = messages.pop::<wire::Body>()? {
-                    part.bodies.push(horma_proto::body_from_wire(body)?);
+                arriving.bodies(&chunk)?;
+            }
+            Some(None) => return Err(out_of_order().into()),
+        }
+    }
+    let submission = arriving.end()?;
+    let place = place.ok_or_else(out_of_order)?;
+    Ok(desk.submit(submission, place).await?)
+}
+
+/// Sends progress until a job is over, if that is waited for, and then its result.
+async fn fetch(
+    desk: &Desk,
+    job: u64,
+    wait: bool,
+    replies: &mpsc::Sender<Result<PathReply, Status>>,
+) -> Result<(), Status> {
+    let mut watched = desk.watch(job)?;
+    let pieces = loop {
+        let View { entry, progress } = watched.borrow_and_update().clone();
+        match entry.stage {
+            Stage::Queued | Stage::Running { .. } if !wait => {
+                let why = format!("job {job} is not over; wait for it with --wait");
+                return Err(Status::failed_precondition(why));
+            }
+            Stage::Queued | Stage::Running { .. } => {
+                let progress = Reply::Progress(progress_to_wire(progress));
+                let kind = Some(progress);
+                send(replies, PathReply { kind }).await?;
+                if watched.changed().await.is_err() {
+                    return Err(Error::ShuttingDown("the master").into());
                 }
             }
-            _ => {
-                let why = "a submission begins with its header, once".to_owned();
-                return Err(Error::Malformed(why).into());
+            Stage::Done { pieces, .. } => break pieces,
+            Stage::Gone { why, .. } => return Err(Error::NoSuchJob(gone(job, why)).into()),
+            Stage::Failed { code, reason, .. } => return Err(Status::new(code.into(), reason)),
+            Stage::Cancelled { .. } => {
+                return Err(Error::JobFailed(format!("job {job} was cancelled")).into());
             }
         }
-    }
-    let missing = |field| Error::Missing {
-        message: "submission",
-        field,
     };
-    if !messages.is_empty() {
-        return Err(missing("the end of its last body").into());
+    for piece in 0..pieces {
+        let piece = desk.result(job, piece).await.map_err(Error::from)?;
+        let dropped = || Error::NoSuchJob(gone(job, Gone::Dropped));
+        let reply = result::from_piece(piece.ok_or_else(dropped)?);
+        send(replies, reply.map_err(Error::from)?).await?;
     }
-    let (job, sharing) = job.ok_or(missing("a header"))?;
-    Ok((part, job, sharing))
+    Ok(())
 }
 
-/// Sends a path and its record; stops if the client hangs up.
-async fn send(replies: &mpsc::Sender<Result<SubmitReply, Status>>, (path, record): Outcome) {
-    let header = wire::PathHeader {
-        trajectory: Some(horma_proto::trajectory_to_wire(&path.trajectory)),
-    };
-    let positions = horma_proto::position_chunks(0, &path.touches, &path.between);
-    let positions = positions.map(Reply::Positions);
-    let record = serde_json::to_vec(&record).map(|json| Reply::Record(json.into()));
-    let kinds = std::iter::once(Reply::Path(header)).chain(positions);
-    let all = kinds
-        .map(Ok)
-        .chain([record.map_err(|e| Status::internal(e.to_string()))]);
-    for kind in all {
-        if replies.send(kind.map(reply)).await.is_err() {
-            return;
+async fn send(
+    replies: &mpsc::Sender<Result<PathReply, Status>>,
+    reply: PathReply,
+) -> Result<(), Status> {
+    let sent = timeout(CLIENT_PATIENCE, replies.send(Ok(reply))).await;
+    match sent {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(_)) | Err(_) => {
+            let seconds = CLIENT_PATIENCE.as_secs();
+            Err(Error::TooSlow { seconds }.into())
         }
     }
 }
 
-fn reply(kind: Reply) -> SubmitReply {
-    SubmitReply { kind: Some(kind) }
+fn gone(job: u64, why: Gone) -> String {
+    let why = match why {
+        Gone::Fetched => "has been fetched",
+        Gone::Dropped => "was dropped, since nobody fetched it in time or there was no room for it",
+    };
+    format!("the result of job {job} {why}; submit the job again")
+}
+
+fn progress_to_wire((phase, done, total): (&str, u64, u64)) -> wire::Progress {
+    let phase = phase.to_owned();
+    wire::Progress { phase, done, total }
+}
+
+fn status(job: u64, View { entry, progress }: View) -> wire::JobStatus {
+    let stage = match &entry.stage {
+        Stage::Queued => wire::Stage::Queued,
+        Stage::Running { .. } => wire::Stage::Running,
+        Stage::Done { .. } => wire::Stage::Done,
+        Stage::Gone { why, .. } => match why {
+            Gone::Fetched => wire::Stage::Fetched,
+            Gone::Dropped => wire::Stage::Dropped,
+        },
+        Stage::Failed { .. } => wire::Stage::Failed,
+        Stage::Cancelled { .. } => wire::Stage::Cancelled,
+    };
+    let running = stage == wire::Stage::Running;
+    wire::JobStatus {
+        job,
+        name: entry.name,
+        stage: stage.into(),
+        submitted_ms: entry.submitted.as_millis() as u64,
+        ended_ms: entry.stage.ended().map_or(0, |at| at.as_millis() as u64),
+        progress: running.then(|| progress_to_wire(progress)),
+        reason: match entry.stage {
+            Stage::Failed { reason, .. } => reason,
+            _ => String::new(),
+        },
+    }
 }

@@ -122,12 +122,13 @@ pub(crate) enum Event {
     Heartbeat { worker: String },
     /// Time went by.
     Tick,
-    /// A job was split into so many extents. If their rows are to be placed, each has a list of those
-    /// others whose rows it needs.
+    /// A job was split into so many extents, of which some are done already. If their rows are to be
+    /// placed, each has a list of those others whose rows it needs.
     Submitted {
         job: u64,
         extents: u32,
         halos: Option<Vec<Vec<u32>>>,
+        done: BTreeSet<u32>,
     },
     /// Nobody wants the job any more.
     Cancelled { job: u64 },
@@ -256,11 +257,15 @@ pub(crate) fn apply(state: &mut State, now: Duration, event: Event) -> Vec<Comma
             job,
             extents,
             halos,
+            done,
         } => {
-            let extents = match halos {
+            let mut extents = match halos {
                 None => vec![Extent::default(); extents as usize],
                 Some(halos) => halos.into_iter().map(Extent::to_be_placed).collect(),
             };
+            for number in done {
+                extents[number as usize].status = Status::Done;
+            }
             state.jobs.insert(job, extents);
             complete(state, job, &mut commands);
         }

@@ -103,6 +103,12 @@ pub enum Error {
         /// By which they were asked for.
         id: TaskId,
     },
+    /// Beyond a limit of the server, now or ever.
+    #[error("{0}")]
+    Limit(String),
+    /// A job that the master does not know (any more), or whose result it does not have (any more).
+    #[error("{0}")]
+    NoSuchJob(String),
     /// The job failed on the cluster.
     #[error("{0}")]
     JobFailed(String),
@@ -120,6 +126,7 @@ impl Error {
     fn code(&self) -> Code {
         match self {
             Self::Core(error) if error.is_impossible() => Code::ResourceExhausted,
+            Self::Limit(_) => Code::ResourceExhausted,
             Self::Core(_) | Self::Missing { .. } | Self::Ragged { .. } | Self::Malformed(_) => {
                 Code::InvalidArgument
             }
@@ -129,7 +136,9 @@ impl Error {
             Self::Unproven => Code::Unauthenticated,
             Self::Forbidden { .. } => Code::PermissionDenied,
             Self::TooSlow { .. } => Code::DeadlineExceeded,
-            Self::UnknownWorker { .. } | Self::NotHeld { .. } => Code::NotFound,
+            Self::UnknownWorker { .. } | Self::NotHeld { .. } | Self::NoSuchJob(_) => {
+                Code::NotFound
+            }
             Self::JobFailed(_) => Code::Aborted,
             Self::ShuttingDown(_) => Code::Unavailable,
         }

@@ -93,6 +93,8 @@ fn latest(state: &State, now: Duration, name: &String) -> Option<Case> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::super::tests::{
         delivered, halo_job, neighbours, placed, submitted, task, told_at, with_workers,
     };
@@ -252,6 +254,7 @@ mod tests {
             job,
             extents,
             halos,
+            done: BTreeSet::new(),
         };
         told_at(10, &mut state, wide);
         for _ in 0..8 {

@@ -15,6 +15,7 @@ pub(super) fn submitted(job: u64, extents: u32) -> Event {
         job,
         extents,
         halos: None,
+        done: BTreeSet::new(),
     }
 }
 
@@ -30,8 +31,8 @@ enum Happens {
     Register(u8, u64),
     Heartbeat(u8),
     Wait(u64),
-    /// So many extents, and how far they reach if their rows are placed.
-    Submit(u32, Option<u32>),
+    /// So many extents, how far they reach if their rows are placed, and a bit for each that is done.
+    Submit(u32, Option<u32>, u8),
     Cancel(u64),
     /// So many of the extent's positions are missing all the same.
     Deliver(usize, u64),
@@ -44,7 +45,8 @@ fn steps() -> impl Strategy<Value = Vec<Happens>> {
         3 => (0..4u8, 0..3u64).prop_map(|(w, i)| Happens::Register(w, i)),
         2 => (0..4u8).prop_map(Happens::Heartbeat),
         1 => (0..12u64).prop_map(Happens::Wait),
-        2 => (0..6u32, prop::option::of(0..3u32)).prop_map(|(n, reach)| Happens::Submit(n, reach)),
+        2 => (0..6u32, prop::option::of(0..3u32), prop_oneof![Just(0), any::<u8>()])
+            .prop_map(|(n, reach, done)| Happens::Submit(n, reach, done)),
         1 => (0..4u64).prop_map(Happens::Cancel),
         6 => (0..8usize, prop_oneof![4 => Just(0), 1 => 1..5u64])
             .prop_map(|(t, left)| Happens::Deliver(t, left)),
@@ -152,11 +154,13 @@ proptest! {
                     now += Duration::from_secs(seconds);
                     Event::Tick
                 }
-                Happens::Submit(extents, reach) => {
+                Happens::Submit(extents, reach, done) => {
                     let job = jobs.len() as u64;
                     jobs.insert(job, extents);
                     let halos = reach.map(|reach| neighbours(extents, reach));
-                    Event::Submitted { job, extents, halos }
+                    let done: BTreeSet<u32> = (0..extents).filter(|e| done >> e & 1 == 1).collect();
+                    kept.extend(done.iter().map(|&extent| (job, extent)));
+                    Event::Submitted { job, extents, halos, done }
                 }
                 Happens::Cancel(job) => {
                     if state.jobs.contains_key(&job) {
@@ -480,7 +484,41 @@ pub(super) fn halo_job(extents: u32) -> Event {
         job: 1,
         extents,
         halos: Some(neighbours(extents, 1)),
+        done: BTreeSet::new(),
     }
+}
+
+/// An extent that was done before is neither placed nor digitized again, unless others need its rows.
+#[test]
+fn a_resumed_job_repeats_only_what_is_needed() {
+    let mut state = State::new(LEASE, LEASE);
+    for worker in ["a", "b", "c", "d", "e"] {
+        let registered = Event::Registered {
+            worker: worker.to_owned(),
+            incarnation: 1,
+        };
+        apply(&mut state, Duration::ZERO, registered);
+    }
+    let resumed = Event::Submitted {
+        job: 1,
+        extents: 5,
+        halos: Some(neighbours(5, 1)),
+        done: BTreeSet::from([0, 1, 4]),
+    };
+    let commands = apply(&mut state, Duration::ZERO, resumed);
+    let placed = commands.iter().map(|command| match command {
+        Command::Place { task, .. } => task.extent,
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(placed.collect::<Vec<_>>(), [1, 2, 3, 4]);
+    let all = Event::Submitted {
+        job: 2,
+        extents: 2,
+        halos: None,
+        done: BTreeSet::from([0, 1]),
+    };
+    let commands = apply(&mut state, Duration::ZERO, all);
+    assert!(matches!(commands[..], [Command::Complete { job: 2 }]));
 }
 
 pub(super) fn placed(worker: &str, extent: u32, attempt: u32) -> Event {

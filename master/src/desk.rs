@@ -1,0 +1,531 @@
+//! The desk: the jobs of clients, from their submission until nobody is going to ask for their result.
+//!
+//! It takes jobs in, has them run in the order in which they came, several at once as far as memory
+//! goes, and keeps results. What it knows it has from the store, and every change is in the store
+//! before anybody hears of it. It knows nothing of workers or extents.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use bytes::Bytes;
+use horma_core::Handout;
+use horma_proto::Error as Refusal;
+use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, watch};
+use tokio::task::spawn_blocking;
+use tokio_util::sync::CancellationToken;
+use tonic::Status;
+use tracing::{error, info, warn};
+
+use crate::error::{Error, Result};
+use crate::journal::Journal;
+use crate::store::{Entry, Gone, Stage, Store};
+use crate::submission::{self, Submission};
+use crate::{Limits, Master, Progress, result};
+
+/// How often is looked for results that are too old.
+const EXPIRY: Duration = Duration::from_secs(10);
+
+/// Jobs that are over and still known: the oldest are forgotten beyond that.
+const REMEMBERED: usize = 10_000;
+
+pub(crate) struct Desk {
+    store: Arc<Store>,
+    master: Master,
+    pub limits: Limits,
+    jobs: Mutex<BTreeMap<u64, Known>>,
+    /// One for each job that is not over.
+    places: Arc<Semaphore>,
+    /// Told when something may begin, or has to go.
+    changed: Notify,
+    shutdown: CancellationToken,
+}
+
+/// A job that is known.
+struct Known {
+    view: watch::Sender<View>,
+    work: Work,
+    stop: CancellationToken,
+    /// Its place among the jobs that are not over.
+    place: Option<OwnedSemaphorePermit>,
+}
+
+/// What there is to be seen of a job.
+#[derive(Debug, Clone)]
+pub(crate) struct View {
+    pub entry: Entry,
+    /// Phase, how much of it is done, and of how much.
+    pub progress: (&'static str, u64, u64),
+}
+
+/// What is being done for a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Work {
+    Nothing,
+    /// One at a time, so that jobs begin in their order.
+    Planning,
+    Digitizing,
+}
+
+impl Desk {
+    /// A desk with what is in the store.
+    pub fn open(
+        store: Store,
+        master: Master,
+        limits: Limits,
+        shutdown: CancellationToken,
+    ) -> Result<Arc<Self>> {
+        let places = Arc::new(Semaphore::new(limits.queue));
+        let known = |(job, entry): (u64, Entry)| {
+            // There may be more than there are places: the limit was another one then.
+            let place = entry.stage.is_open().then(|| places.clone());
+            let place = place.and_then(|places| places.try_acquire_owned().ok());
+            (job, Known::new(entry, place))
+        };
+        let jobs: BTreeMap<u64, Known> = store.jobs()?.into_iter().map(known).collect();
+        let open = |known: &&Known| known.view.borrow().entry.stage.is_open();
+        info!(
+            jobs = jobs.len(),
+            open = jobs.values().filter(open).count(),
+            "store"
+        );
+        Ok(Arc::new(Self {
+            store: Arc::new(store),
+            master,
+            limits,
+            jobs: Mutex::new(jobs),
+            places,
+            changed: Notify::new(),
+            shutdown,
+        }))
+    }
+
+    /// Has jobs run and results dropped, until the shutdown.
+    pub async fn serve(self: Arc<Self>) {
+        let mut ticks = tokio::time::interval(EXPIRY);
+        loop {
+            tokio::select! {
+                () = self.shutdown.cancelled() => return,
+                () = self.changed.notified() => {}
+                _ = ticks.tick() => {}
+            }
+            self.expire().await;
+            if let Some(job) = self.begin_next() {
+                tokio::spawn(self.clone().work(job));
+            }
+        }
+    }
+
+    /// The job that was submitted with this key.
+    pub fn find(&self, key: u128) -> Option<u64> {
+        let jobs = self.lock();
+        let mut jobs = jobs.iter();
+        let found = jobs.find(|(_, known)| known.view.borrow().entry.key == key);
+        found.map(|(&job, _)| job)
+    }
+
+    /// A place for one more job.
+    pub fn place(&self) -> std::result::Result<OwnedSemaphorePermit, Refusal> {
+        let place = self.places.clone().try_acquire_owned();
+        place.map_err(|_| {
+            let limit = self.limits.queue;
+            Refusal::Limit(format!(
+                "{limit} jobs are queued or running, as many as this master takes (--max-jobs); try again when one is done"
+            ))
+        })
+    }
+
+    /// Takes a job in, on its place; returns its number.
+    pub async fn submit(
+        self: &Arc<Self>,
+        submission: Submission,
+        place: OwnedSemaphorePermit,
+    ) -> std::result::Result<u64, Refusal> {
+        let desk = self.clone();
+        let taking = spawn_blocking(move || desk.take_in(submission, place));
+        let stopping = |_| Refusal::ShuttingDown("the master");
+        taking.await.map_err(stopping)?
+    }
+
+    fn take_in(
+        &self,
+        submission: Submission,
+        place: OwnedSemaphorePermit,
+    ) -> std::result::Result<u64, Refusal> {
+        let Submission {
+            key,
+            name,
+            job,
+            sharing,
+            part,
+            pieces,
+        } = submission;
+        let (memory, here) = self.master.memory();
+        let memory = Handout::predict(&part, &job, sharing.distribution, memory, here)?;
+        drop(part);
+        let entry = Entry {
+            key,
+            name,
+            submitted: now(),
+            memory,
+            stage: Stage::Queued,
+        };
+        let (job, new) = self.store.submit(&entry, &pieces).map_err(Refusal::from)?;
+        if new {
+            info!(job, name = entry.name, memory, "submitted");
+            self.lock().insert(job, Known::new(entry, Some(place)));
+            self.changed.notify_one();
+        }
+        Ok(job)
+    }
+
+    /// One job, or all.
+    pub fn status(&self, job: Option<u64>) -> std::result::Result<Vec<(u64, View)>, Refusal> {
+        let jobs = self.lock();
+        let view = |(&job, known): (&u64, &Known)| (job, known.view.borrow().clone());
+        match job {
+            None => Ok(jobs.iter().map(view).collect()),
+            Some(job) => {
+                let known = jobs.get_key_value(&job).ok_or_else(|| unknown(job))?;
+                Ok(vec![view(known)])
+            }
+        }
+    }
+
+    /// A job as it goes on.
+    pub fn watch(&self, job: u64) -> std::result::Result<watch::Receiver<View>, Refusal> {
+        let jobs = self.lock();
+        let known = jobs.get(&job).ok_or_else(|| unknown(job))?;
+        Ok(known.view.subscribe())
+    }
+
+    /// Ends a job, unless it is over.
+    pub async fn cancel(self: &Arc<Self>, job: u64) -> std::result::Result<(), Refusal> {
+        drop(self.watch(job)?);
+        let end = move |store: &Store| store.end(job, Stage::Cancelled { at: now() });
+        self.change(job, end).await.map_err(Refusal::from)
+    }
+
+    /// A piece of a result.
+    pub async fn result(&self, job: u64, piece: u32) -> Result<Option<Bytes>> {
+        let store = self.store.clone();
+        let reading = spawn_blocking(move || store.result(job, piece));
+        reading.await.map_err(|_| Error::Interrupted)?
+    }
+
+    /// Drops a result that the client has.
+    pub async fn discard(self: &Arc<Self>, job: u64) -> std::result::Result<(), Refusal> {
+        drop(self.watch(job)?);
+        let discard = move |store: &Store| store.drop_result(job, Gone::Fetched);
+        self.change(job, discard).await.map_err(Refusal::from)
+    }
+
+    /// Changes a job's stage in the store, and then for all to see.
+    async fn change(
+        self: &Arc<Self>,
+        job: u64,
+        how: impl FnOnce(&Store) -> Result<Option<Stage>> + Send + 'static,
+    ) -> Result<()> {
+        let store = self.store.clone();
+        let changing = spawn_blocking(move || how(&store));
+        if let Some(stage) = changing.await.map_err(|_| Error::Interrupted)?? {
+            self.show(job, stage);
+        }
+        Ok(())
+    }
+
+    /// Shows a stage that the store has.
+    fn show(&self, job: u64, stage: Stage) {
+        let mut jobs = self.lock();
+        let Some(known) = jobs.get_mut(&job) else {
+            return;
+        };
+        if !stage.is_open() {
+            known.stop.cancel();
+            known.place = None;
+        }
+        known.view.send_if_modified(|view| {
+            let changed = view.entry.stage != stage;
+            if changed {
+                info!(job, ?stage, "job");
+                view.entry.stage = stage;
+            }
+            changed
+        });
+        self.changed.notify_one();
+    }
+
+    /// The next job that may begin, which is now being planned.
+    fn begin_next(&self) -> Option<u64> {
+        let mut jobs = self.lock();
+        let tell = |(&job, known): (&u64, &Known)| {
+            let view = known.view.borrow();
+            let entry = &view.entry;
+            entry
+                .stage
+                .is_open()
+                .then_some((job, entry.memory, known.work))
+        };
+        let open: Vec<_> = jobs.iter().filter_map(tell).collect();
+        let next = next(&open, self.limits.running, self.master.memory().0)?;
+        jobs.get_mut(&next)?.work = Work::Planning;
+        Some(next)
+    }
+
+    fn set_work(&self, job: u64, work: Work) {
+        if let Some(known) = self.lock().get_mut(&job) {
+            known.work = work;
+        }
+        self.changed.notify_one();
+    }
+
+    /// Runs a job and keeps what comes of it.
+    async fn work(self: Arc<Self>, job: u64) {
+        let stop = self.lock().get(&job).map(|known| known.stop.clone());
+        let stop = stop.unwrap_or_default();
+        let outcome = tokio::select! {
+            outcome = self.perform(job) => outcome,
+            // Whoever stopped it has said why.
+            () = stop.cancelled() => Err(Error::Interrupted),
+            () = self.shutdown.cancelled() => Err(Error::Interrupted),
+        };
+        let kept = match outcome {
+            Ok(pieces) => {
+                let finish = move |store: &Store| store.finish(job, now(), &pieces);
+                self.change(job, finish).await
+            }
+            Err(error) => Err(error),
+        };
+        let kept = match kept {
+            Err(Error::Interrupted) | Ok(()) => Ok(()),
+            Err(error) => {
+                warn!(job, %error, "failed");
+                let status = Status::from(Refusal::from(error));
+                let stage = Stage::Failed {
+                    at: now(),
+                    code: status.code().into(),
+                    reason: status.message().to_owned(),
+                };
+                let end = move |store: &Store| store.end(job, stage);
+                self.change(job, end).await
+            }
+        };
+        if let Err(error) = kept {
+            error!(job, %error, "the store did not take the end of this job; it goes on at the next start");
+        }
+        self.set_work(job, Work::Nothing);
+    }
+
+    /// Plans a job, has it digitized, and makes pieces of the result.
+    async fn perform(&self, job: u64) -> Result<Vec<Bytes>> {
+        let store = self.store.clone();
+        let read = spawn_blocking(move || {
+            let again = submission::again(store.submission(job)?);
+            again.map_err(|e| Error::StoreDamaged(format!("job {job}: {e}")))
+        });
+        let sent = read.await.map_err(|_| Error::Interrupted)??;
+        let (progress, memory) = (self.progress(job), self.share(job));
+        progress("discretize", 0, 0);
+        let planning = self.master.plan(sent.part, sent.job, sent.sharing, memory);
+        let planned = planning.await?;
+        let workers = self.master.gather(1).await?;
+        // Once it is split it stays so, whoever is there.
+        let workers = match self.stage(job) {
+            Some(Stage::Running { workers, .. }) => workers,
+            _ => workers,
+        };
+        let journal = Journal {
+            store: self.store.clone(),
+            job,
+        };
+        let resumed = journal.resume(planned.plan.clone(), workers).await?;
+        self.show(job, resumed.stage.clone());
+        let running = self.master.begin(planned, workers, Some(resumed), progress);
+        let running = running.await?;
+        self.set_work(job, Work::Digitizing);
+        let outcome = running.end().await?;
+        let pieces = spawn_blocking(move || result::to_pieces(&outcome));
+        pieces.await.map_err(|_| Error::Interrupted)?
+    }
+
+    /// Tells how far a job is, for as long as it is known.
+    fn progress(&self, job: u64) -> Progress {
+        let view = self.lock().get(&job).map(|known| known.view.clone());
+        Arc::new(move |phase, done, total| {
+            if let Some(view) = &view {
+                view.send_modify(|view| view.progress = (phase, done, total));
+            }
+        })
+    }
+
+    fn stage(&self, job: u64) -> Option<Stage> {
+        let jobs = self.lock();
+        jobs.get(&job)
+            .map(|known| known.view.borrow().entry.stage.clone())
+    }
+
+    /// The memory that the other jobs under way leave to a job.
+    fn share(&self, job: u64) -> u64 {
+        let jobs = self.lock();
+        let others = jobs.iter().filter(|(other, _)| **other != job);
+        let taken = others
+            .filter(|(_, known)| known.work != Work::Nothing)
+            .map(|(_, known)| known.view.borrow().entry.memory)
+            .fold(0, u64::saturating_add);
+        self.master.memory().0.saturating_sub(taken)
+    }
+
+    /// Drops results that are too old or too many, and forgets jobs that ended long ago.
+    async fn expire(self: &Arc<Self>) {
+        let ended = self.ended();
+        let Expired { dropped, forgotten } = expired(ended, &self.limits, now());
+        for job in dropped {
+            let drop = move |store: &Store| store.drop_result(job, Gone::Dropped);
+            if let Err(error) = self.change(job, drop).await {
+                warn!(job, %error, "its result is not dropped");
+            }
+        }
+        for job in forgotten {
+            let store = self.store.clone();
+            let forgetting = spawn_blocking(move || store.forget(job)).await;
+            match forgetting {
+                Ok(Ok(())) => drop(self.lock().remove(&job)),
+                Ok(Err(error)) => warn!(job, %error, "not forgotten"),
+                Err(_) => return,
+            }
+        }
+    }
+
+    /// When jobs ended at which nobody is looking, and what their results take.
+    fn ended(&self) -> Vec<(Duration, u64, u64)> {
+        let jobs = self.lock();
+        let unwatched = jobs.iter().filter(|(_, k)| k.view.receiver_count() == 0);
+        let ended = unwatched.filter_map(|(&job, known)| {
+            let stage = &known.view.borrow().entry.stage;
+            let bytes = match stage {
+                Stage::Done { bytes, .. } => *bytes,
+                _ => 0,
+            };
+            Some((stage.ended()?, job, bytes))
+        });
+        ended.collect()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Known>> {
+        // Every change is a single assignment: there is no half of one to be seen.
+        self.jobs.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Known {
+    fn new(entry: Entry, place: Option<OwnedSemaphorePermit>) -> Self {
+        let progress = ("wait", 0, 0);
+        Self {
+            view: watch::Sender::new(View { entry, progress }),
+            work: Work::Nothing,
+            stop: CancellationToken::new(),
+            place,
+        }
+    }
+}
+
+/// The first job that waits, if it may begin beside those under way: jobs that are not over, each with
+/// the memory it takes and what is being done for it. None overtakes another, so none waits for ever.
+fn next(open: &[(u64, u64, Work)], at_once: usize, memory: u64) -> Option<u64> {
+    let (waiting, busy): (Vec<_>, Vec<_>) = open.iter().partition(|job| job.2 == Work::Nothing);
+    let &&(next, needed, _) = waiting.first()?;
+    let taken = busy
+        .iter()
+        .fold(0, |sum: u64, job| sum.saturating_add(job.1));
+    let planning = busy.iter().any(|job| job.2 == Work::Planning);
+    let fits = busy.is_empty() || taken.saturating_add(needed) <= memory;
+    (fits && !planning && busy.len() < at_once).then_some(next)
+}
+
+/// What is not kept any longer.
+#[derive(Debug, PartialEq, Eq, Default)]
+struct Expired {
+    /// Jobs whose results go.
+    dropped: Vec<u64>,
+    /// Jobs that are forgotten altogether.
+    forgotten: Vec<u64>,
+}
+
+/// Results go when they are too old, and the oldest when all take too much; jobs go when they ended long
+/// ago, and the oldest when there are too many. Of each: when it ended, its number, its result's bytes.
+fn expired(mut ended: Vec<(Duration, u64, u64)>, limits: &Limits, now: Duration) -> Expired {
+    // The newest first.
+    ended.sort_unstable_by(|a, b| b.cmp(a));
+    let mut all = Expired::default();
+    let mut kept = 0u64;
+    for (i, &(at, job, bytes)) in ended.iter().enumerate() {
+        let age = now.saturating_sub(at);
+        kept = kept.saturating_add(bytes);
+        if i >= REMEMBERED || (bytes == 0 && age > limits.keep) {
+            all.forgotten.push(job);
+        } else if bytes > 0 && (age > limits.keep || kept > limits.keep_bytes) {
+            all.dropped.push(job);
+        }
+    }
+    all
+}
+
+fn now() -> Duration {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.unwrap_or_default()
+}
+
+fn unknown(job: u64) -> Refusal {
+    Refusal::NoSuchJob(format!(
+        "there is no job {job} here; `horma status` lists those there are"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Work::{Digitizing, Nothing, Planning};
+
+    #[test]
+    fn jobs_begin_in_order_as_far_as_memory_goes() {
+        let check = |open: &[(u64, u64, Work)], expected| {
+            assert_eq!(next(open, 3, 100), expected, "{open:?}");
+        };
+        check(&[], None);
+        check(&[(1, 500, Nothing)], Some(1));
+        check(&[(1, 50, Planning), (2, 1, Nothing)], None);
+        check(&[(1, 50, Digitizing), (2, 50, Nothing)], Some(2));
+        check(&[(1, 50, Digitizing), (2, 51, Nothing)], None);
+        // The big one is not overtaken for ever.
+        let big = [(1, 50, Digitizing), (2, 51, Nothing), (3, 1, Nothing)];
+        check(&big, None);
+        let three = [1, 2, 3].map(|job| (job, 1, Digitizing));
+        check(&[&three[..], &[(4, 1, Nothing)]].concat(), None);
+        check(&[(1, u64::MAX, Digitizing), (2, u64::MAX, Nothing)], None);
+    }
+
+    #[test]
+    fn results_are_dropped_by_age_and_by_size_and_jobs_forgotten_later() {
+        let limits = Limits {
+            part: 0,
+            queue: 1,
+            running: 1,
+            keep_bytes: 100,
+            keep: Duration::from_secs(10),
+        };
+        let at = Duration::from_secs;
+        let check = |ended: &[(u64, u64)], dropped: &[u64], forgotten: &[u64]| {
+            let numbered = (1..).zip(ended);
+            let ended = numbered.map(|(job, &(seconds, bytes))| (at(seconds), job, bytes));
+            let all = expired(ended.collect(), &limits, at(100));
+            assert_eq!((&all.dropped[..], &all.forgotten[..]), (dropped, forgotten));
+        };
+        check(&[(95, 50), (96, 50)], &[], &[]);
+        check(&[(89, 1), (95, 1)], &[1], &[]);
+        check(&[(89, 0), (95, 0)], &[], &[1]);
+        check(&[(95, 40), (97, 30), (96, 40)], &[1], &[]);
+        check(&[(95, 101)], &[1], &[]);
+        let many = vec![(95, 0); REMEMBERED + 1];
+        check(&many, &[], &[1]);
+    }
+}
