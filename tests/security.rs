@@ -11,8 +11,8 @@ use horma_proto::transport::{connect, endpoint};
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::worker_client::WorkerClient;
 use horma_proto::wire::{
-    CancelRequest, DigitizeRequest, DiscardRequest, HeartbeatRequest, PathRequest, RegisterRequest,
-    StatusRequest, SubmitRequest,
+    CancelRequest, DigitizeRequest, DiscardRequest, HeartbeatRequest, LeaveRequest, PathRequest,
+    RegisterRequest, StatusRequest, SubmitRequest,
 };
 use tonic::transport::{Certificate, Channel, ClientTlsConfig};
 use tonic::{Code, Status};
@@ -218,6 +218,8 @@ async fn every_call_is_for_one_role() {
         check_guard(Role::Worker, caller, register);
         let heartbeat = client.heartbeat(HeartbeatRequest::default()).await;
         check_guard(Role::Worker, caller, heartbeat);
+        let leave = client.leave(LeaveRequest::default()).await;
+        check_guard(Role::Worker, caller, leave);
         let nothing = tokio_stream::iter([SubmitRequest::default()]);
         check_guard(Role::Client, caller, client.submit(nothing).await);
         let job = 1;
@@ -235,8 +237,8 @@ async fn every_call_is_for_one_role() {
     }
     serving.signal("-TERM");
     let (_, log) = serving.end();
-    // Two roles too many at each of seven calls, and one submission without a header.
-    assert!(log.contains("forbidden=14 malformed=1"), "{log}");
+    // Two roles too many at each of eight calls, and one submission without a header.
+    assert!(log.contains("forbidden=16 malformed=1"), "{log}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

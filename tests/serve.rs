@@ -63,6 +63,12 @@ fn fetched(master: &str, id: &str, out: &Path) -> Vec<u8> {
     std::fs::read(out.join("path.csv")).expect("a path")
 }
 
+/// Tells a process to stop; returns its exit code and what it said.
+fn terminated(process: Process) -> (Option<i32>, String) {
+    process.signal("-TERM");
+    process.end()
+}
+
 /// A master on the store of one that was killed, at the same address.
 fn again(address: &str, store: &Path, more: &[&str]) -> Process {
     let args = ["master", "--bind", address, "--store", text(store)];
@@ -120,6 +126,94 @@ fn check_killed(distribution: &str) {
         worker.wait_for(&["no answer"]);
         assert_eq!(worker.child.try_wait().expect("known"), None);
     }
+}
+
+#[test]
+fn a_worker_that_is_told_to_stop_gives_back_what_it_is_at() {
+    let dir = scratch();
+    let job = long_job(dir.path());
+    let alone = path_of(&job, dir.path(), "alone", &["--method", "exact"]);
+    for distribution in ["overlap", "halo"] {
+        let (mut master, address) = master(&[]);
+        let mut leaves = worker(&address, "leaves");
+        let _stays = worker(&address, "stays");
+        let id = detach(&job, &address, &["--distribution", distribution]);
+        leaves.wait_for(&["positions", "first="]);
+        let (code, log) = terminated(leaves);
+        assert_eq!(code, Some(0), "{log}");
+        master.wait_for(&["left worker=\"leaves\""]);
+        let out = dir.path().join(distribution);
+        assert!(fetched(&address, &id, &out) == alone);
+        let lost = &report(&out)["lost"][0];
+        assert!(
+            lost["reason"]
+                .as_str()
+                .expect("a reason")
+                .contains("worker leaves left"),
+            "{lost}"
+        );
+    }
+}
+
+#[test]
+fn a_master_that_is_told_to_stop_lets_workers_end_what_they_are_at() {
+    let dir = scratch();
+    let job = long_job(dir.path());
+    let alone = path_of(&job, dir.path(), "alone", &["--method", "exact"]);
+    let store = dir.path().join("store");
+    let drain = ["--store", text(&store), "--drain", "100"];
+    let (mut first, address) = master(&drain);
+    let mut killed = worker(&address, "killed");
+    let mut ends = worker(&address, "ends");
+    let [one, other] = ["1", "2"].map(|_| detach(&job, &address, &[]));
+    for worker in [&mut killed, &mut ends] {
+        worker.wait_for(&["positions", "first="]);
+    }
+    // Its extent waits, and nobody is to begin it.
+    drop(killed);
+    first.signal("-TERM");
+    first.wait_for(&["draining"]);
+    let refused = run(&[
+        "submit",
+        text(&job),
+        "--detach",
+        "--patience",
+        "0",
+        "--master",
+        &address,
+    ]);
+    let (_, err) = texts(&refused);
+    assert_eq!(refused.status.code(), Some(4), "{err}");
+    assert!(err.contains("shutting down"), "{err}");
+    let (code, log) = first.end();
+    assert_eq!(code, Some(0), "{log}");
+    assert!(log.contains("journalled job=1"), "{log}");
+    let _second = again(&address, &store, &[]);
+    for id in [one, other] {
+        assert!(fetched(&address, &id, &dir.path().join(&id)) == alone);
+    }
+    let resumed = &report(&dir.path().join("1"))["extents_from_journal"];
+    assert_eq!(resumed.as_u64(), Some(1), "the other one was not begun");
+}
+
+#[test]
+fn what_takes_too_long_is_left_to_the_store_and_a_second_signal_waits_for_nothing() {
+    let dir = scratch();
+    let job = long_job(dir.path());
+    let store = dir.path().join("store");
+    let (mut first, address) = master(&["--store", text(&store), "--drain", "1000"]);
+    let mut worker = worker(&address, "w");
+    let id = detach(&job, &address, &[]);
+    worker.wait_for(&["positions", "first="]);
+    worker.signal("-STOP");
+    first.signal("-TERM");
+    first.wait_for(&["draining"]);
+    let (code, log) = terminated(first);
+    assert_eq!(code, Some(130), "{log}");
+    let second = again(&address, &store, &["--drain", "0"]);
+    assert_eq!(status(&address, &id)["stage"], "running");
+    let (code, log) = terminated(second);
+    assert_eq!(code, Some(0), "{log}");
 }
 
 #[test]

@@ -586,6 +586,10 @@ pub(crate) struct Master {
     /// is started on it again goes on where the last one was killed [default: all in memory, and lost]
     #[arg(long, value_name = "DIR", env = "HORMA_STORE")]
     pub store: Option<PathBuf>,
+    /// How long it waits, when it is told to stop, for what workers are at; what is not done by then is
+    /// left to the store. A second signal ends it at once
+    #[arg(long, value_name = "S", env = "HORMA_DRAIN", default_value_t = 5)]
+    pub drain: u64,
     #[command(flatten)]
     pub limits: Limits,
 }

@@ -43,6 +43,7 @@ pub(crate) fn master(args: &Master) -> Result<()> {
             },
         }),
     };
+    let drain = Duration::from_secs(args.drain);
     serve(async {
         let (listener, bound) = listen(&args.bind, trusted).await?;
         let address = reach::of_master(args.advertise.as_deref(), bound);
@@ -51,13 +52,18 @@ pub(crate) fn master(args: &Master) -> Result<()> {
             .map(|f| reach::publish(f, &address))
             .transpose()?;
         let shutdown = CancellationToken::new();
-        let (_master, serving) = horma_master::start(listener, config, shutdown.clone())?;
+        let (master, serving) = horma_master::start(listener, config, shutdown.clone())?;
         let mut serving = std::pin::pin!(serving);
         tokio::select! {
             served = &mut serving => return served.map_or(Ok(()), |s| Ok(s?)),
-            () = system::interrupted() => shutdown.cancel(),
+            () = system::interrupted() => {}
         }
-        serving.await.map_or(Ok(()), |s| Ok(s?))
+        unless_again(async {
+            master.drain(drain).await;
+            shutdown.cancel();
+            serving.await.map_or(Ok(()), |s| Ok(s?))
+        })
+        .await
     })
 }
 
@@ -77,14 +83,22 @@ pub(crate) fn worker(args: Worker) -> Result<()> {
             simd: args.simd.unwrap_or_else(Simd::best),
             patience: Duration::from_secs(args.patience),
         };
-        let shutdown = CancellationToken::new();
-        let stopping = shutdown.clone();
-        tokio::spawn(async move {
-            system::interrupted().await;
-            stopping.cancel();
-        });
-        Ok(horma_worker::run(listener, config, shutdown).await?)
+        let leave = CancellationToken::new();
+        let mut running = std::pin::pin!(horma_worker::run(listener, config, leave.clone()));
+        tokio::select! {
+            ran = &mut running => return Ok(ran?),
+            () = system::interrupted() => leave.cancel(),
+        }
+        unless_again(async { Ok(running.await?) }).await
     })
+}
+
+/// Comes to an end in good order, or at once if that is asked for a second time.
+async fn unless_again(ending: impl Future<Output = Result<()>>) -> Result<()> {
+    tokio::select! {
+        ended = ending => ended,
+        () = system::interrupted() => Err(Error::Interrupted),
+    }
 }
 
 /// One of the two is given: parsing sees to it.

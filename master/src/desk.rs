@@ -106,6 +106,7 @@ impl Desk {
         loop {
             tokio::select! {
                 () = self.shutdown.cancelled() => return,
+                () = self.master.draining.cancelled() => return,
                 () = self.changed.notified() => {}
                 _ = ticks.tick() => {}
             }
@@ -126,6 +127,9 @@ impl Desk {
 
     /// A place for one more job.
     pub fn place(&self) -> std::result::Result<OwnedSemaphorePermit, Refusal> {
+        if self.master.draining.is_cancelled() {
+            return Err(Refusal::ShuttingDown("the master"));
+        }
         let place = self.places.clone().try_acquire_owned();
         place.map_err(|_| {
             let limit = self.limits.queue;

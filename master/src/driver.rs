@@ -49,6 +49,14 @@ pub(crate) enum Message {
         /// What is going on, if it is known.
         reply: oneshot::Sender<Option<Going>>,
     },
+    /// A worker is about to stop.
+    Leave {
+        worker: String,
+        incarnation: u64,
+        reply: oneshot::Sender<()>,
+    },
+    /// The master is about to: it answers when everybody is through with what was begun.
+    Drain { reply: oneshot::Sender<()> },
     Run {
         plan: Arc<Handout>,
         workers: u32,
@@ -87,6 +95,7 @@ pub(crate) fn start(
         jobs: BTreeMap::new(),
         next_job: 1,
         incarnation,
+        drained: None,
         inbox: inbox.downgrade(),
         count,
     };
@@ -108,6 +117,8 @@ struct Driver {
     jobs: BTreeMap<u64, RunningJob>,
     next_job: u64,
     incarnation: u64,
+    /// Who waits for the end of what was begun.
+    drained: Option<oneshot::Sender<()>>,
     inbox: mpsc::WeakSender<Message>,
     count: watch::Sender<usize>,
 }
@@ -125,6 +136,9 @@ impl Driver {
                     None => break,
                 },
                 _ = ticks.tick() => self.tick(),
+            }
+            if let Some(drained) = self.drained.take_if(|_| self.state.is_idle()) {
+                let _ = drained.send(());
             }
             self.count.send_if_modified(|n| {
                 let now = self.state.workers();
@@ -197,6 +211,22 @@ impl Driver {
                     next_job: self.next_job,
                 });
                 let _ = reply.send(going);
+            }
+            Message::Leave {
+                worker,
+                incarnation,
+                reply,
+            } => {
+                if self.state.knows(&worker, incarnation) {
+                    info!(worker, "left");
+                    self.apply(Event::Left { worker }, None);
+                }
+                let _ = reply.send(());
+            }
+            Message::Drain { reply } => {
+                info!("draining");
+                self.drained = Some(reply);
+                self.apply(Event::Drain, None);
             }
             Message::Run {
                 plan,

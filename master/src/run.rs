@@ -21,6 +21,8 @@ pub struct Master {
     config: Config,
     /// New each time a master starts: it counts its jobs anew.
     pub(crate) incarnation: u64,
+    /// Cancelled when the master is about to stop.
+    pub(crate) draining: CancellationToken,
 }
 
 /// A job with its plan.
@@ -45,7 +47,22 @@ impl Master {
             workers,
             config,
             incarnation,
+            draining: CancellationToken::new(),
         }
+    }
+
+    /// Takes nothing in and begins nothing from now on; returns when what workers are at is done, or
+    /// after so long.
+    pub async fn drain(&self, within: Duration) {
+        self.draining.cancel();
+        let (reply, drained) = oneshot::channel();
+        let draining = async {
+            if self.tell(Message::Drain { reply }).await.is_ok() {
+                // A driver that has stopped has nothing to wait for.
+                let _ = drained.await;
+            }
+        };
+        let _ = tokio::time::timeout(within, draining).await;
     }
 
     /// Number of workers, as it changes.

@@ -8,8 +8,8 @@ use horma_proto::wire::path_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
 use horma_proto::wire::{
     self, CancelReply, CancelRequest, DiscardReply, DiscardRequest, HeartbeatReply,
-    HeartbeatRequest, PathReply, PathRequest, RegisterReply, RegisterRequest, StatusReply,
-    StatusRequest, SubmitReply, SubmitRequest,
+    HeartbeatRequest, LeaveReply, LeaveRequest, PathReply, PathRequest, RegisterReply,
+    RegisterRequest, StatusReply, StatusRequest, SubmitReply, SubmitRequest,
 };
 use horma_proto::{Error, Guard, Role};
 use tokio::sync::{mpsc, oneshot};
@@ -115,6 +115,21 @@ impl Api for Service {
             Some(Going { jobs, next_job }) => Ok(Response::new(HeartbeatReply { jobs, next_job })),
             None => Err(Error::UnknownWorker { worker: name }.into()),
         }
+    }
+
+    async fn leave(&self, call: Call<LeaveRequest>) -> Result<Response<LeaveReply>, Status> {
+        self.guard.admit(&call, Role::Worker)?;
+        let LeaveRequest {
+            worker,
+            incarnation,
+        } = call.into_inner();
+        let leave = |reply| Message::Leave {
+            worker,
+            incarnation,
+            reply,
+        };
+        self.ask(leave).await?;
+        Ok(Response::new(LeaveReply {}))
     }
 
     async fn submit(

@@ -23,7 +23,7 @@ use horma_proto::TaskId;
 
 use self::assign::assign;
 use self::help::help;
-use self::lose::{gone, lose};
+use self::lose::{gone, leave, lose};
 use self::pace::Pace;
 use crate::error::Error;
 
@@ -40,6 +40,8 @@ pub(crate) struct State {
     /// Since when there has been nobody, and how the last one was lost.
     deserted: Option<Duration>,
     last_loss: Option<String>,
+    /// Whether the master is about to stop.
+    draining: bool,
     /// Workers that answered wrongly; they are not trusted again until they start anew.
     distrusted: BTreeMap<String, u64>,
 }
@@ -120,6 +122,10 @@ pub(crate) enum Event {
     Registered { worker: String, incarnation: u64 },
     /// A worker said that it is alive.
     Heartbeat { worker: String },
+    /// A worker is about to stop.
+    Left { worker: String },
+    /// The master is about to stop: what runs may end, and nothing begins.
+    Drain,
     /// Time went by.
     Tick,
     /// A job was split into so many extents, of which some are done already. If their rows are to be
@@ -226,6 +232,11 @@ impl State {
         self.distrusted.get(worker) == Some(&incarnation)
     }
 
+    /// Whether everybody is through with what was begun.
+    pub fn is_idle(&self) -> bool {
+        self.workers.values().all(|w| w.task.is_none())
+    }
+
     /// Number of workers.
     pub fn workers(&self) -> usize {
         self.workers.len()
@@ -252,6 +263,8 @@ pub(crate) fn apply(state: &mut State, now: Duration, event: Event) -> Vec<Comma
                 worker.seen = now;
             }
         }
+        Event::Left { worker } => leave(state, &worker, &mut commands),
+        Event::Drain => state.draining = true,
         Event::Tick => expire(state, now, &mut commands),
         Event::Submitted {
             job,
@@ -310,8 +323,10 @@ pub(crate) fn apply(state: &mut State, now: Duration, event: Event) -> Vec<Comma
         }
     }
     desert(state, now, &mut commands);
-    assign(state, now, &mut commands);
-    help(state, now, &mut commands);
+    if !state.draining {
+        assign(state, now, &mut commands);
+        help(state, now, &mut commands);
+    }
     commands
 }
 

@@ -56,12 +56,14 @@ pub struct Config {
 /// How long open tasks may take to notice a shutdown.
 const DRAIN: Duration = Duration::from_secs(5);
 
-/// Serves on `listener` until `shutdown`, or until the master has been gone for too long.
+/// Serves on `listener` until it is told to leave, or until the master has been gone for too long. What
+/// it is at when it leaves is given back: what has come of it is the master's already.
 ///
 /// # Errors
 /// [`Error::NoMaster`] if the master never answered, [`Error::Refused`] if it did not want this
 /// worker, and errors of the operating system.
-pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationToken) -> Result<()> {
+pub async fn run(listener: TcpListener, config: Config, leave: CancellationToken) -> Result<()> {
+    let shutdown = CancellationToken::new();
     let bound = listener.local_addr().map_err(Error::Listener)?;
     info!(worker = config.id, %bound, "listening");
     let pool = rayon::ThreadPoolBuilder::new()
@@ -85,7 +87,7 @@ pub async fn run(listener: TcpListener, config: Config, shutdown: CancellationTo
         tokio::spawn(
             async move { transport::serve(service, listener, tls.as_ref(), stopped).await },
         );
-    let outcome = membership::keep(&config, bound, &store, &shutdown).await;
+    let outcome = membership::keep(&config, bound, &store, &leave).await;
     // Membership is what a worker lives for: without it there is nobody to serve.
     shutdown.cancel();
     // A task that does not notice is abandoned: the master gives its extent to another.

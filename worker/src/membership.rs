@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use horma_proto::transport::{self, Trouble, WANTS_TLS};
 use horma_proto::wire::master_client::MasterClient;
-use horma_proto::wire::{HeartbeatRequest, RegisterRequest};
+use horma_proto::wire::{HeartbeatRequest, LeaveRequest, RegisterRequest};
 use horma_proto::{Answer, Role, VERSION};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
@@ -25,13 +25,13 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 /// Longest time for one call.
 const DEADLINE: Duration = Duration::from_secs(5);
 
-/// Keeps this worker a member until `shutdown`, or until the master has been silent for longer than
+/// Keeps this worker a member until it is told to leave, or until the master has been silent for longer than
 /// the worker's patience: then there is no more work, which is no error if there ever was a master.
 pub(crate) async fn keep(
     config: &Config,
     bound: SocketAddr,
     store: &Store,
-    shutdown: &CancellationToken,
+    leaving: &CancellationToken,
 ) -> Result<()> {
     let member = async {
         let mut heard: Option<Instant> = None;
@@ -78,8 +78,25 @@ pub(crate) async fn keep(
     };
     tokio::select! {
         outcome = member => outcome,
-        () = shutdown.cancelled() => Ok(()),
+        () = leaving.cancelled() => {
+            if let Err(reason) = leave(config).await {
+                warn!(master = %config.master, reason, "left without a word");
+            }
+            Ok(())
+        }
     }
+}
+
+/// Tells the master that this worker is about to stop, so that what it has goes to others at once.
+async fn leave(config: &Config) -> std::result::Result<(), String> {
+    let master = config.master.look().await?;
+    let mut client = connect(config, &master).map_err(|e| e.to_string())?;
+    let request = LeaveRequest {
+        worker: config.id.clone(),
+        incarnation: config.incarnation,
+    };
+    let left = client.leave(request).await;
+    left.map(drop).map_err(|status| status.message().to_owned())
 }
 
 fn connect(config: &Config, master: &str) -> Result<MasterClient<Channel>> {

@@ -1,5 +1,6 @@
-//! Who does what next: idle workers are given what waits, oldest job first, lowest extent first. Who has
-//! been faster so far comes first, and holds more rows.
+//! Who does what next: idle workers are given what waits, one at a time to the job at which the fewest
+//! are, so that a small one is not stuck behind a big one; among such the oldest, and of it the lowest
+//! extent. Who has been faster so far comes first, and holds more rows.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -16,33 +17,45 @@ pub(super) fn assign(state: &mut State, now: Duration, commands: &mut Vec<Comman
         .keys()
         .filter(|name| state.workers[*name].task.is_none())
         .collect();
-    for (&job, extents) in &mut state.jobs {
-        if idle.is_empty() {
+    while !idle.is_empty() {
+        let next = in_turn(state).into_iter().find_map(|job| {
+            let extents = state.jobs.get_mut(&job)?;
+            place(job, extents, &state.workers, &members, &mut idle)
+                .or_else(|| start(job, extents, &members, &mut idle))
+        });
+        let Some((step, command)) = next else {
             return;
+        };
+        if let Command::Place { worker, task } | Command::Start { worker, task, .. } = &command
+            && let Some(worker) = state.workers.get_mut(worker)
+        {
+            worker.take(now, *task, step);
         }
-        let mut given = place(job, extents, &state.workers, &members, &mut idle);
-        given.extend(start(job, extents, &members, &mut idle));
-        for (step, command) in given {
-            if let Command::Place { worker, task } | Command::Start { worker, task, .. } = &command
-                && let Some(worker) = state.workers.get_mut(worker)
-            {
-                worker.take(now, *task, step);
-            }
-            commands.push(command);
-        }
+        commands.push(command);
     }
 }
 
-/// Places the rows of extents that wait, or whose rows others need that are not done.
+/// The jobs, those first at which the fewest workers are.
+fn in_turn(state: &State) -> Vec<u64> {
+    let mut at: BTreeMap<u64, u32> = state.jobs.keys().map(|&job| (job, 0)).collect();
+    for (task, _) in state.workers.values().filter_map(|w| w.task) {
+        *at.entry(task.job).or_default() += 1;
+    }
+    let mut jobs: Vec<u64> = state.jobs.keys().copied().collect();
+    jobs.sort_by_key(|job| at[job]);
+    jobs
+}
+
+/// Places the rows of an extent that waits, or whose rows others need that are not done.
 fn place(
     job: u64,
     extents: &mut [Extent],
     workers: &BTreeMap<String, Worker>,
     members: &BTreeMap<String, f64>,
     idle: &mut BTreeSet<&String>,
-) -> Vec<(Step, Command)> {
+) -> Option<(Step, Command)> {
     if extents.iter().all(|e| e.rows != Rows::Nowhere) {
-        return Vec::new();
+        return None;
     }
     let mut load: BTreeMap<&String, u32> = BTreeMap::new();
     for held in extents.iter().filter_map(Extent::held) {
@@ -60,7 +73,6 @@ fn place(
         }
     }
     let wanted = wanted(extents);
-    let mut given = Vec::new();
     for ((number, extent), wanted) in (0u32..).zip(extents).zip(wanted) {
         if !wanted || extent.rows != Rows::Nowhere {
             continue;
@@ -73,31 +85,25 @@ fn place(
         if !idle.remove(worker) {
             continue;
         }
-        taking.insert(worker);
-        *load.entry(worker).or_default() += 1;
         extent.attempts += 1;
         extent.only_placed = true;
         extent.rows = Rows::OnTheWay;
         let task = task(job, number, extent);
         let worker = worker.clone();
-        given.push((Step::Place, Command::Place { worker, task }));
+        return Some((Step::Place, Command::Place { worker, task }));
     }
-    given
+    None
 }
 
-/// Starts extents that wait: where their rows are, once all that they need are placed, or with any
+/// Starts an extent that waits: where its rows are, once all that they need are placed, or with any
 /// worker if rows travel with the task.
 fn start(
     job: u64,
     extents: &mut [Extent],
     members: &BTreeMap<String, f64>,
     idle: &mut BTreeSet<&String>,
-) -> Vec<(Step, Command)> {
-    let mut given = Vec::new();
+) -> Option<(Step, Command)> {
     for i in 0..extents.len() {
-        if idle.is_empty() {
-            break;
-        }
         if extents[i].status != Status::Waiting {
             continue;
         }
@@ -128,9 +134,9 @@ fn start(
             rows,
             helps: None,
         };
-        given.push((Step::Digitize, start));
+        return Some((Step::Digitize, start));
     }
-    given
+    None
 }
 
 /// Which extents' rows somebody is still going to need.

@@ -110,6 +110,28 @@ fn retry(
     }
 }
 
+/// A worker leaves of its own will: what it had waits for others, and counts as nobody's failure.
+pub(super) fn leave(state: &mut State, name: &str, commands: &mut Vec<Command>) {
+    let Some(worker) = state.workers.remove(name) else {
+        return;
+    };
+    let reason = format!("worker {name} left");
+    state.last_loss = Some(reason.clone());
+    forget(state, name);
+    let Some((task, step)) = worker.task else {
+        return;
+    };
+    match step {
+        Step::Digitize => stopped(state, task),
+        Step::Place => {
+            if let Some(extent) = extent(state, task) {
+                extent.rows = Rows::Nowhere;
+            }
+        }
+    }
+    commands.push(Command::Abort { task, reason });
+}
+
 /// What a worker had is gone with it: the rows it held, and its task.
 pub(super) fn gone(
     state: &mut State,

@@ -30,6 +30,8 @@ pub(super) fn neighbours(extents: u32, reach: u32) -> Vec<Vec<u32>> {
 enum Happens {
     Register(u8, u64),
     Heartbeat(u8),
+    Leave(u8),
+    Drain,
     Wait(u64),
     /// So many extents, how far they reach if their rows are placed, and a bit for each that is done.
     Submit(u32, Option<u32>, u8),
@@ -44,6 +46,7 @@ fn steps() -> impl Strategy<Value = Vec<Happens>> {
     let step = prop_oneof![
         3 => (0..4u8, 0..3u64).prop_map(|(w, i)| Happens::Register(w, i)),
         2 => (0..4u8).prop_map(Happens::Heartbeat),
+        1 => (0..4u8).prop_map(Happens::Leave),
         1 => (0..12u64).prop_map(Happens::Wait),
         2 => (0..6u32, prop::option::of(0..3u32), prop_oneof![Just(0), any::<u8>()])
             .prop_map(|(n, reach, done)| Happens::Submit(n, reach, done)),
@@ -54,7 +57,17 @@ fn steps() -> impl Strategy<Value = Vec<Happens>> {
             .prop_map(|(t, came, left)| Happens::Progress(t, came, left)),
         3 => (0..8usize, 0..7u8).prop_map(|(t, how)| Happens::Fail(t, how)),
     ];
-    prop::collection::vec(step, 1..120)
+    let until_drained = (
+        prop::collection::vec(step.clone(), 1..120),
+        prop::collection::vec(step, 0..20),
+    );
+    until_drained.prop_map(|(mut steps, after)| {
+        if !after.is_empty() {
+            steps.push(Happens::Drain);
+        }
+        steps.extend(after);
+        steps
+    })
 }
 
 /// Holds after every event.
@@ -114,7 +127,7 @@ fn check(state: &State) {
                     let ready =
                         is(Status::Waiting) && assign::needed(extents, i as usize, own).is_some();
                     assert!(
-                        !ready || state.workers[&own.worker].task.is_some(),
+                        !ready || state.draining || state.workers[&own.worker].task.is_some(),
                         "its holder idles while an extent waits"
                     );
                     false
@@ -123,7 +136,7 @@ fn check(state: &State) {
             // Rows may be meant for a faster one that is about to take others.
             let meant = extent.rows == Rows::Nowhere && placing.iter().any(|(j, _)| *j == job);
             assert!(
-                !(waits && idle) || meant,
+                !(waits && idle) || meant || state.draining,
                 "nobody idles while an extent waits"
             );
         }
@@ -150,6 +163,8 @@ proptest! {
                     Event::Registered { worker: name(w), incarnation }
                 }
                 Happens::Heartbeat(w) => Event::Heartbeat { worker: name(w) },
+                Happens::Leave(w) => Event::Left { worker: name(w) },
+                Happens::Drain => Event::Drain,
                 Happens::Wait(seconds) => {
                     now += Duration::from_secs(seconds);
                     Event::Tick
@@ -194,11 +209,16 @@ proptest! {
                     None => Event::Tick,
                 },
             };
+            let draining = state.draining || matches!(event, Event::Drain);
             for command in apply(&mut state, now, event) {
                 match command {
                     Command::Place { worker, task } => {
+                        prop_assert!(!draining, "nothing begins any more");
                         prop_assert!(state.workers.contains_key(&worker) || ended.contains(&task.job));
                         started.push((worker, task, Step::Place, Vec::new()));
+                    }
+                    Command::Start { .. } if draining => {
+                        prop_assert!(false, "nothing begins any more");
                     }
                     Command::Start { worker, task, rows, helps } => {
                         prop_assert!(helps.is_none() || rows.is_empty());
@@ -488,16 +508,89 @@ pub(super) fn halo_job(extents: u32) -> Event {
     }
 }
 
+/// Who is started by an event, for which job.
+fn started(state: &mut State, event: Event) -> Vec<(u64, u32)> {
+    let commands = apply(state, Duration::ZERO, event);
+    let starts = commands.iter().filter_map(|command| match command {
+        Command::Start { task, .. } => Some((task.job, task.extent)),
+        _ => None,
+    });
+    starts.collect()
+}
+
+fn arrives(worker: &str) -> Event {
+    Event::Registered {
+        worker: worker.to_owned(),
+        incarnation: 1,
+    }
+}
+
+#[test]
+fn a_small_job_is_not_stuck_behind_a_big_one() {
+    let mut state = State::new(LEASE, LEASE);
+    assert_eq!(started(&mut state, arrives("a")), []);
+    assert_eq!(started(&mut state, submitted(1, 100)), [(1, 0)]);
+    assert_eq!(started(&mut state, submitted(2, 2)), []);
+    // Whoever comes goes where fewest are, and to the older one if that is both.
+    let next = ["b", "c", "d", "e"].map(|worker| started(&mut state, arrives(worker)));
+    assert_eq!(next, [[(2, 0)], [(1, 1)], [(2, 1)], [(1, 2)]]);
+    // So does whoever is through.
+    started(&mut state, submitted(3, 5));
+    let task = TaskId {
+        job: 1,
+        extent: 0,
+        attempt: 1,
+    };
+    let through = Event::Delivered {
+        worker: "a".to_owned(),
+        task,
+        left: 0,
+    };
+    assert_eq!(started(&mut state, through), [(3, 0)]);
+}
+
+#[test]
+fn what_a_worker_leaves_is_for_others_and_nobodys_failure() {
+    let mut state = State::new(LEASE, LEASE);
+    started(&mut state, arrives("a"));
+    started(&mut state, submitted(1, 1));
+    let left = apply(
+        &mut state,
+        Duration::ZERO,
+        Event::Left {
+            worker: "a".to_owned(),
+        },
+    );
+    assert!(matches!(&left[..], [Command::Abort { .. }]), "{left:?}");
+    assert_eq!(state.jobs[&1][0].failures, 0);
+    assert_eq!(started(&mut state, arrives("b")), [(1, 0)]);
+}
+
+#[test]
+fn what_runs_may_end_when_the_master_is_about_to_stop() {
+    let mut state = State::new(LEASE, LEASE);
+    started(&mut state, arrives("a"));
+    started(&mut state, submitted(1, 2));
+    started(&mut state, Event::Drain);
+    assert!(!state.is_idle());
+    assert_eq!(started(&mut state, arrives("b")), []);
+    let task = task(0, 1);
+    let through = Event::Delivered {
+        worker: "a".to_owned(),
+        task,
+        left: 0,
+    };
+    assert_eq!(started(&mut state, through), []);
+    assert!(state.is_idle());
+    assert_eq!(state.jobs[&1][0].status, Status::Done);
+}
+
 /// An extent that was done before is neither placed nor digitized again, unless others need its rows.
 #[test]
 fn a_resumed_job_repeats_only_what_is_needed() {
     let mut state = State::new(LEASE, LEASE);
     for worker in ["a", "b", "c", "d", "e"] {
-        let registered = Event::Registered {
-            worker: worker.to_owned(),
-            incarnation: 1,
-        };
-        apply(&mut state, Duration::ZERO, registered);
+        apply(&mut state, Duration::ZERO, arrives(worker));
     }
     let resumed = Event::Submitted {
         job: 1,
