@@ -11,8 +11,8 @@ use horma_proto::transport::{connect, endpoint};
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::worker_client::WorkerClient;
 use horma_proto::wire::{
-    CancelRequest, DigitizeRequest, DiscardRequest, HeartbeatRequest, LeaveRequest, PathRequest,
-    RegisterRequest, StatusRequest, SubmitRequest,
+    CancelRequest, DialBackRequest, DigitizeRequest, DiscardRequest, HeartbeatRequest,
+    LeaveRequest, PathRequest, RegisterRequest, StatusRequest, SubmitRequest,
 };
 use tonic::transport::{Certificate, Channel, ClientTlsConfig};
 use tonic::{Code, Status};
@@ -218,12 +218,19 @@ async fn every_call_is_for_one_role() {
         check_guard(Role::Worker, caller, register);
         let heartbeat = client.heartbeat(HeartbeatRequest::default()).await;
         check_guard(Role::Worker, caller, heartbeat);
+        let dial_back = client.dial_back(DialBackRequest::default()).await;
+        check_guard(Role::Worker, caller, dial_back);
         let leave = client.leave(LeaveRequest::default()).await;
         check_guard(Role::Worker, caller, leave);
         let nothing = tokio_stream::iter([SubmitRequest::default()]);
         check_guard(Role::Client, caller, client.submit(nothing).await);
         let job = 1;
-        let status = client.status(StatusRequest { job: Some(job) }).await;
+        let status = client
+            .status(StatusRequest {
+                job: Some(job),
+                after: 0,
+            })
+            .await;
         check_guard(Role::Client, caller, status);
         let cancel = client.cancel(CancelRequest { job }).await;
         check_guard(Role::Client, caller, cancel);
@@ -237,8 +244,9 @@ async fn every_call_is_for_one_role() {
     }
     serving.signal("-TERM");
     let (_, log) = serving.end();
-    // Two roles too many at each of eight calls, and one submission without a header.
-    assert!(log.contains("forbidden=16 malformed=1"), "{log}");
+    // Two roles too many at each of nine calls, one call back without a word, and one submission
+    // without a header.
+    assert!(log.contains("forbidden=18 malformed=2"), "{log}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

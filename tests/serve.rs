@@ -10,7 +10,7 @@ use common::{
 };
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::submit_request::Kind;
-use horma_proto::wire::{self, Job, SubmitHeader, SubmitRequest};
+use horma_proto::wire::{self, Job, PathRequest, SubmitHeader, SubmitRequest};
 use serde_json::Value;
 use tonic::{Code, Status};
 
@@ -457,6 +457,18 @@ async fn what_is_beyond_a_limit_is_refused_with_what_to_do() {
     assert_eq!(submit_raw(&address, 1).await.expect("known"), 1);
     succeed(&["cancel", "1", "--master", &address]);
     submit_raw(&address, 2).await.expect("there is a place");
+    let (_master, address) = master(&["--max-calls", "1"]);
+    let id = submit_raw(&address, 1).await.expect("the only call");
+    let mut client = MasterClient::connect(format!("http://{address}"))
+        .await
+        .expect("serves");
+    let request = PathRequest {
+        job: id,
+        wait: true,
+    };
+    let waiting = client.fetch(request).await.expect("the only call");
+    check(submit_raw(&address, 2).await, "--max-calls");
+    drop(waiting);
     let (_master, address) = master(&["--max-part", "0"]);
     check(submit_raw(&address, 1).await, "--max-part");
     let dir = scratch();

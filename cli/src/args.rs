@@ -75,6 +75,19 @@ pub(crate) enum Command {
     Master(Master),
     /// Serve as a worker of a master
     Worker(Worker),
+    /// Tell whether this host is fit for a worker: addresses, limits, certificates, the way to the master
+    /// and the way back
+    ///
+    /// Takes what `horma worker` takes, and listens as it would. Every check is one line: ok, warning or
+    /// failed, and what to do. It computes nothing and joins nothing. Run it where a worker does not
+    /// register, or registers and gets no work.
+    #[command(after_help = "\
+Examples:
+  horma doctor                                           this host alone
+  horma doctor --master 10.0.0.1:7171 --bind 0.0.0.0:0 --tls-ca ca.pem ...    and the way both ways
+
+Exit codes: 0 no check failed, 2 something here is wrong, 4 master and worker do not reach each other.")]
+    Doctor(Doctor),
     /// Make a test authority, and certificates of it for a master, workers and clients
     ///
     /// For tests and small private networks: one certificate serves all workers, the authority's key
@@ -609,6 +622,9 @@ pub(crate) struct Limits {
     /// Jobs that wait or are under way
     #[arg(long, value_name = "N", env = "HORMA_MAX_JOBS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_jobs: u32,
+    /// Calls of clients that are open at once; who waits for a job has one open
+    #[arg(long, value_name = "N", env = "HORMA_MAX_CALLS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_calls: u32,
     /// Jobs under way at once; fewer if they do not fit into memory together
     #[arg(long, value_name = "N", env = "HORMA_MAX_RUNNING", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_running: u32,
@@ -667,6 +683,38 @@ pub(crate) struct Worker {
     /// a master is the end of the work and exit code 0; never to find one is 4
     #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
     pub patience: u64,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Doctor {
+    /// Where the master listens [default: nothing is said about one]
+    #[arg(
+        long,
+        value_name = "HOST:PORT",
+        env = "HORMA_MASTER",
+        conflicts_with = "rendezvous"
+    )]
+    pub master: Option<String>,
+    /// File into which the master writes its address
+    #[arg(long, value_name = "FILE", env = "HORMA_RENDEZVOUS")]
+    pub rendezvous: Option<PathBuf>,
+    /// Where to listen as a worker would; port 0 takes any free one
+    #[arg(
+        long,
+        value_name = "HOST:PORT",
+        env = "HORMA_BIND",
+        default_value = "127.0.0.1:0"
+    )]
+    pub bind: String,
+    /// Address that a worker would tell the master; without a port, the port that is bound [default:
+    /// the one that leads to the master]
+    #[arg(long, value_name = "HOST[:PORT]", env = "HORMA_ADVERTISE")]
+    pub advertise: Option<String>,
+    /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated
+    #[arg(long, conflicts_with = "tls_ca")]
+    pub insecure: bool,
+    #[command(flatten)]
+    pub tls: Tls,
 }
 
 pub(crate) fn print_completions(shell: Shell) {

@@ -86,7 +86,11 @@ impl Remote {
 
     /// Makes sure that it is a master that took the connection: there is no job 0.
     async fn greet(&self, client: &mut Client) -> Result<()> {
-        match client.status(short(StatusRequest { job: Some(0) })).await {
+        let nobody = StatusRequest {
+            job: Some(0),
+            after: 0,
+        };
+        match client.status(short(nobody)).await {
             Err(status) if Answer::of(&status) != Answer::Stranger => {
                 Err(self.meaning(status.into()))
             }

@@ -92,6 +92,13 @@ pub(crate) enum Error {
         "without its fallback, or without delta_u and delta_v, the local search goes over the whole path in one process; use `horma run` without workers"
     )]
     OneProcess,
+    #[error("{failed} of {checks} checks failed")]
+    Unfit {
+        failed: usize,
+        checks: usize,
+        /// Whether what is wrong is here.
+        here: bool,
+    },
     #[error("cannot start threads: {0}")]
     Threads(String),
     #[error("interrupted")]
@@ -126,6 +133,7 @@ impl Error {
             | Self::Refused { .. }
             | Self::NoSuchJob { .. }
             | Self::OneProcess
+            | Self::Unfit { here: true, .. }
             | Self::Worker(
                 horma_worker::Error::Address { .. }
                 | horma_worker::Error::Untrusted { .. }
@@ -139,6 +147,7 @@ impl Error {
             | Self::JobFailed { .. }
             | Self::BadReply { .. }
             | Self::Certs(_)
+            | Self::Unfit { here: false, .. }
             | Self::Threads(_) => 4,
             Self::Interrupted => 130,
         }

@@ -14,8 +14,17 @@ use crate::{say, submit};
 pub(crate) fn status(args: &args::Status) -> Result<()> {
     let remote = Remote::of(&args.remote)?;
     let jobs = runtime()?.block_on(remote.call(async |mut client, _| {
-        let reply = client.status(short(StatusRequest { job: args.id })).await?;
-        Ok(reply.into_inner().jobs)
+        let mut jobs: Vec<JobStatus> = Vec::new();
+        loop {
+            let (job, after) = (args.id, jobs.last().map_or(0, |last| last.job));
+            let reply = client.status(short(StatusRequest { job, after })).await?;
+            let reply = reply.into_inner();
+            let more = reply.more && !reply.jobs.is_empty();
+            jobs.extend(reply.jobs);
+            if !more {
+                return Ok(jobs);
+            }
+        }
     }))?;
     if args.json {
         let jobs: Vec<_> = jobs.iter().map(json).collect();

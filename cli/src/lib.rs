@@ -17,6 +17,7 @@ mod verify;
 
 mod bench;
 mod certs;
+mod doctor;
 mod inspect;
 mod reach;
 mod serve;
@@ -77,6 +78,7 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Verify(args) => verify::verify(&args),
         Command::Master(master) => serve::master(&master),
         Command::Worker(worker) => serve::worker(worker),
+        Command::Doctor(args) => doctor::doctor(&args),
         Command::Certs(certs) => certs::certs(&certs),
         Command::Init { directory } => inspect::init(&directory),
         Command::Inspect { files } => inspect::inspect(&files),

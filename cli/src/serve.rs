@@ -37,6 +37,7 @@ pub(crate) fn master(args: &Master) -> Result<()> {
             limits: Limits {
                 part: args.limits.max_part.saturating_mul(1_000_000),
                 queue: args.limits.max_jobs as usize,
+                calls: args.limits.max_calls as usize,
                 running: args.limits.max_running as usize,
                 keep_bytes: args.limits.keep_mb.saturating_mul(1_000_000),
                 keep: Duration::from_secs(args.limits.keep_hours.saturating_mul(3600)),
@@ -102,7 +103,7 @@ async fn unless_again(ending: impl Future<Output = Result<()>>) -> Result<()> {
 }
 
 /// One of the two is given: parsing sees to it.
-fn rendezvous(file: Option<PathBuf>, address: Option<String>) -> Rendezvous {
+pub(crate) fn rendezvous(file: Option<PathBuf>, address: Option<String>) -> Rendezvous {
     file.map_or_else(
         || Rendezvous::Address(address.unwrap_or_default()),
         Rendezvous::File,
@@ -121,9 +122,15 @@ fn serve(server: impl Future<Output = Result<()>>) -> Result<()> {
     served
 }
 
-/// Listens, and prints where: with port 0 nobody could know otherwise. Beyond this machine only if
-/// what comes from there can be trusted.
+/// Listens, and prints where: with port 0 nobody could know otherwise.
 async fn listen(address: &str, trusted: bool) -> Result<(TcpListener, SocketAddr)> {
+    let (listener, bound) = bind_as(address, trusted).await?;
+    say(&format!("listening on {bound}"));
+    Ok((listener, bound))
+}
+
+/// Listens; beyond this machine only if what comes from there can be trusted.
+pub(crate) async fn bind_as(address: &str, trusted: bool) -> Result<(TcpListener, SocketAddr)> {
     let listener = bind(address).await?;
     let bound = listener.local_addr().map_err(|source| Error::Bind {
         address: address.to_owned(),
@@ -134,7 +141,6 @@ async fn listen(address: &str, trusted: bool) -> Result<(TcpListener, SocketAddr
             address: bound.to_string(),
         });
     }
-    say(&format!("listening on {bound}"));
     Ok((listener, bound))
 }
 

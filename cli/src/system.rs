@@ -52,6 +52,40 @@ fn cpu_of(_process: u32) -> Option<f64> {
     None
 }
 
+/// Addresses of this host that others may reach, each with its interface; none where the system does
+/// not tell.
+pub(crate) fn addresses() -> Vec<String> {
+    #[cfg(target_os = "linux")]
+    if let Ok(all) = nix::ifaddrs::getifaddrs() {
+        let named = all.filter_map(|one| {
+            let address = one.address?;
+            let v4 = address
+                .as_sockaddr_in()
+                .map(|a| std::net::IpAddr::V4(a.ip()));
+            let v6 = address
+                .as_sockaddr_in6()
+                .map(|a| std::net::IpAddr::V6(a.ip()));
+            let ip = v4.or(v6).filter(|ip| !ip.is_loopback())?;
+            Some(format!("{ip} ({})", one.interface_name))
+        });
+        return named.collect();
+    }
+    Vec::new()
+}
+
+/// How many files this process may have open; nothing where the system does not tell.
+pub(crate) fn open_files() -> Option<u64> {
+    #[cfg(target_os = "linux")]
+    {
+        use nix::sys::resource::{Resource, getrlimit};
+        getrlimit(Resource::RLIMIT_NOFILE)
+            .ok()
+            .map(|(soft, _)| soft)
+    }
+    #[cfg(not(target_os = "linux"))]
+    None
+}
+
 /// This host's name.
 pub(crate) fn host_name() -> String {
     System::host_name().unwrap_or_else(|_| "localhost".to_owned())

@@ -11,7 +11,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use bytes::Bytes;
 use horma_core::Handout;
 use horma_proto::Error as Refusal;
-use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, watch};
+use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
 use tokio::task::spawn_blocking;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
@@ -26,6 +26,9 @@ use crate::{Limits, Master, Progress, result};
 /// How often is looked for results that are too old.
 const EXPIRY: Duration = Duration::from_secs(10);
 
+/// Parts that come in at once; others wait.
+const PARTS: usize = 4;
+
 /// Jobs that are over and still known: the oldest are forgotten beyond that.
 const REMEMBERED: usize = 10_000;
 
@@ -33,6 +36,10 @@ pub(crate) struct Desk {
     store: Arc<Store>,
     master: Master,
     pub limits: Limits,
+    /// One for each open call of a client.
+    calls: Arc<Semaphore>,
+    /// One for each part that is coming in.
+    parts: Semaphore,
     jobs: Mutex<BTreeMap<u64, Known>>,
     /// One for each job that is not over.
     places: Arc<Semaphore>,
@@ -92,6 +99,8 @@ impl Desk {
         Ok(Arc::new(Self {
             store: Arc::new(store),
             master,
+            calls: Arc::new(Semaphore::new(limits.calls)),
+            parts: Semaphore::new(PARTS),
             limits,
             jobs: Mutex::new(jobs),
             places,
@@ -115,6 +124,23 @@ impl Desk {
                 tokio::spawn(self.clone().work(job));
             }
         }
+    }
+
+    /// A client's call, for as long as this is held.
+    pub fn call(&self) -> std::result::Result<OwnedSemaphorePermit, Refusal> {
+        let call = self.calls.clone().try_acquire_owned();
+        call.map_err(|_| {
+            let limit = self.limits.calls;
+            Refusal::Limit(format!(
+                "{limit} calls of clients are open, as many as this master takes (--max-calls); try again later"
+            ))
+        })
+    }
+
+    /// Waits until a part may come in: each is in memory until it is in the store.
+    pub async fn part(&self) -> std::result::Result<SemaphorePermit<'_>, Refusal> {
+        let part = self.parts.acquire().await;
+        part.map_err(|_| Refusal::ShuttingDown("the master"))
     }
 
     /// The job that was submitted with this key.
@@ -183,17 +209,12 @@ impl Desk {
         Ok(job)
     }
 
-    /// One job, or all.
-    pub fn status(&self, job: Option<u64>) -> std::result::Result<Vec<(u64, View)>, Refusal> {
+    /// The first jobs with greater numbers than `after`, at most so many.
+    pub fn status(&self, after: u64, most: usize) -> Vec<(u64, View)> {
         let jobs = self.lock();
-        let view = |(&job, known): (&u64, &Known)| (job, known.view.borrow().clone());
-        match job {
-            None => Ok(jobs.iter().map(view).collect()),
-            Some(job) => {
-                let known = jobs.get_key_value(&job).ok_or_else(|| unknown(job))?;
-                Ok(vec![view(known)])
-            }
-        }
+        let rest = jobs.range(after.saturating_add(1)..).take(most);
+        rest.map(|(&job, known)| (job, known.view.borrow().clone()))
+            .collect()
     }
 
     /// A job as it goes on.
@@ -513,6 +534,7 @@ mod tests {
         let limits = Limits {
             part: 0,
             queue: 1,
+            calls: 1,
             running: 1,
             keep_bytes: 100,
             keep: Duration::from_secs(10),

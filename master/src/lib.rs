@@ -80,6 +80,8 @@ pub struct Limits {
     pub part: u64,
     /// Jobs that are not over.
     pub queue: usize,
+    /// Calls of clients that are open at once.
+    pub calls: usize,
     /// Jobs at once at the workers.
     pub running: usize,
     /// Results that are kept, bytes.
@@ -123,6 +125,7 @@ pub fn start(
     };
     let service = service::Service {
         guard: Guard::of(tls.as_ref()),
+        tls: tls.clone(),
         heartbeat,
         master: master.clone(),
         desk,

@@ -1,18 +1,18 @@
 //! What workers and clients see of the master.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use horma_proto::wire::master_server::Master as Api;
 use horma_proto::wire::path_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
 use horma_proto::wire::{
-    self, CancelReply, CancelRequest, DiscardReply, DiscardRequest, HeartbeatReply,
-    HeartbeatRequest, LeaveReply, LeaveRequest, PathReply, PathRequest, RegisterReply,
-    RegisterRequest, StatusReply, StatusRequest, SubmitReply, SubmitRequest,
+    self, CancelReply, CancelRequest, DialBackReply, DialBackRequest, DiscardReply, DiscardRequest,
+    HeartbeatReply, HeartbeatRequest, LeaveReply, LeaveRequest, PathReply, PathRequest,
+    RegisterReply, RegisterRequest, StatusReply, StatusRequest, SubmitReply, SubmitRequest,
 };
-use horma_proto::{Error, Guard, Role};
-use tokio::sync::{mpsc, oneshot};
+use horma_proto::{Error, Guard, Role, Tls, VERSION, transport};
+use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
@@ -28,6 +28,9 @@ use crate::{Master, result};
 /// Replies that may wait for a client.
 const WAITING_REPLIES: usize = 16;
 
+/// Jobs in one answer.
+const STATUSES: usize = 1000;
+
 /// How long a client may take to send the next piece of its part, or to take one of its path.
 const CLIENT_PATIENCE: Duration = Duration::from_secs(30);
 
@@ -35,6 +38,8 @@ pub(crate) struct Service {
     pub master: Master,
     /// Who may call what.
     pub guard: Guard,
+    /// What this master proves itself by to workers.
+    pub tls: Option<Tls>,
     /// How often a worker is to say that it is alive.
     pub heartbeat: Duration,
     /// The jobs of clients, if there may be any.
@@ -56,11 +61,12 @@ impl Service {
         answer.await.map_err(|_| stopping.into())
     }
 
-    /// The desk, for a client.
-    fn desk<T>(&self, call: &Call<T>) -> Result<&Arc<Desk>, Status> {
+    /// The desk, for a client's call, which is open for as long as the second is held.
+    fn desk<T>(&self, call: &Call<T>) -> Result<(&Arc<Desk>, OwnedSemaphorePermit), Status> {
         self.guard.admit(call, Role::Client)?;
         let none = || Status::unimplemented("this master serves no clients");
-        self.desk.as_ref().ok_or_else(none)
+        let desk = self.desk.as_ref().ok_or_else(none)?;
+        Ok((desk, desk.call()?))
     }
 }
 
@@ -117,6 +123,28 @@ impl Api for Service {
         }
     }
 
+    async fn dial_back(
+        &self,
+        call: Call<DialBackRequest>,
+    ) -> Result<Response<DialBackReply>, Status> {
+        self.guard.admit(&call, Role::Worker)?;
+        let DialBackRequest { address, word } = call.into_inner();
+        let malformed = |_| Error::Malformed("the word to be said is not of 16 bytes".to_owned());
+        let word = word[..].try_into().map_err(malformed)?;
+        let trouble = if address.is_empty() {
+            String::new()
+        } else {
+            let reached = transport::reach(&address, Role::Worker, self.tls.as_ref(), word).await;
+            reached.err().unwrap_or_default()
+        };
+        let since = SystemTime::now().duration_since(UNIX_EPOCH);
+        Ok(Response::new(DialBackReply {
+            version: VERSION.to_owned(),
+            unix_ms: since.map_or(0, |t| t.as_millis() as u64),
+            trouble,
+        }))
+    }
+
     async fn leave(&self, call: Call<LeaveRequest>) -> Result<Response<LeaveReply>, Status> {
         self.guard.admit(&call, Role::Worker)?;
         let LeaveRequest {
@@ -136,39 +164,50 @@ impl Api for Service {
         &self,
         call: Call<Streaming<SubmitRequest>>,
     ) -> Result<Response<SubmitReply>, Status> {
-        let desk = self.desk(&call)?;
+        let (desk, _open) = self.desk(&call)?;
         let job = submit(desk, call.into_inner()).await?;
         Ok(Response::new(SubmitReply { job }))
     }
 
     async fn status(&self, call: Call<StatusRequest>) -> Result<Response<StatusReply>, Status> {
-        let desk = self.desk(&call)?;
-        let jobs = desk.status(call.get_ref().job)?;
+        let (desk, _open) = self.desk(&call)?;
+        let StatusRequest { job, after } = call.into_inner();
+        let (jobs, more) = match job {
+            Some(job) => (vec![(job, desk.watch(job)?.borrow().clone())], false),
+            None => {
+                let mut jobs = desk.status(after, STATUSES + 1);
+                let more = jobs.len() > STATUSES;
+                jobs.truncate(STATUSES);
+                (jobs, more)
+            }
+        };
         let jobs = jobs.into_iter().map(|(job, view)| status(job, view));
         let jobs = jobs.collect();
-        Ok(Response::new(StatusReply { jobs }))
+        Ok(Response::new(StatusReply { jobs, more }))
     }
 
     async fn cancel(&self, call: Call<CancelRequest>) -> Result<Response<CancelReply>, Status> {
-        let desk = self.desk(&call)?;
+        let (desk, _open) = self.desk(&call)?;
         desk.cancel(call.get_ref().job).await?;
         Ok(Response::new(CancelReply {}))
     }
 
     async fn discard(&self, call: Call<DiscardRequest>) -> Result<Response<DiscardReply>, Status> {
-        let desk = self.desk(&call)?;
+        let (desk, _open) = self.desk(&call)?;
         desk.discard(call.get_ref().job).await?;
         Ok(Response::new(DiscardReply {}))
     }
 
     async fn fetch(&self, call: Call<PathRequest>) -> Result<Response<Self::FetchStream>, Status> {
-        let desk = self.desk(&call)?.clone();
+        let (desk, open) = self.desk(&call)?;
+        let desk = desk.clone();
         let PathRequest { job, wait } = call.into_inner();
         // At once, so that an unknown job is not the end of a stream.
         drop(desk.watch(job)?);
         let (replies, stream) = mpsc::channel(WAITING_REPLIES);
         let shutdown = self.shutdown.clone();
         tokio::spawn(async move {
+            let _open = open;
             let sent = tokio::select! {
                 sent = fetch(&desk, job, wait, &replies) => sent,
                 () = shutdown.cancelled() => Err(Error::ShuttingDown("the master").into()),
@@ -189,7 +228,7 @@ async fn submit(desk: &Arc<Desk>, mut requests: Streaming<SubmitRequest>) -> Res
     let most = desk.limits.part;
     let mut arriving = Arriving::default();
     let mut bytes = 0;
-    let mut place = None;
+    let (mut place, mut part) = (None, None);
     loop {
         let seconds = CLIENT_PATIENCE.as_secs();
         let next = timeout(CLIENT_PATIENCE, requests.message()).await;
@@ -203,6 +242,7 @@ async fn submit(desk: &Arc<Desk>, mut requests: Streaming<SubmitRequest>) -> Res
                     return Ok(job);
                 }
                 place = Some(desk.place()?);
+                part = Some(desk.part().await?);
             }
             Some(Some(Request::Bodies(chunk))) => {
                 bytes += chunk.data.len() as u64;
@@ -220,7 +260,9 @@ async fn submit(desk: &Arc<Desk>, mut requests: Streaming<SubmitRequest>) -> Res
     }
     let submission = arriving.end()?;
     let place = place.ok_or_else(out_of_order)?;
-    Ok(desk.submit(submission, place).await?)
+    let job = desk.submit(submission, place).await?;
+    drop(part);
+    Ok(job)
 }
 
 /// Sends progress until a job is over, if that is waited for, and then its result.

@@ -90,6 +90,7 @@ fn words(roles: &[Role]) -> String {
 #[derive(Clone)]
 pub struct Tls {
     roles: Vec<Role>,
+    days: u64,
     pub(crate) connector: TlsConnector,
     pub(crate) acceptor: TlsAcceptor,
 }
@@ -130,8 +131,9 @@ impl Tls {
             .build()
             .map_err(|_| BadTls::Authority("not a certificate"))?;
         let (own, between) = chain.split_first().ok_or(BadTls::Certificate("not PEM"))?;
-        let verified = verifier.verify_client_cert(own, between, UnixTime::now());
-        verified.map_err(|error| BadTls::of(&error))?;
+        let verified = |time| verifier.verify_client_cert(own, between, time);
+        verified(UnixTime::now()).map_err(|error| BadTls::of(&error))?;
+        let days = days_left(|time| verified(time).is_ok());
 
         // Whatever the peers run, it is the same version of this.
         let version = [&rustls::version::TLS13];
@@ -151,9 +153,20 @@ impl Tls {
         client.alpn_protocols = vec![b"h2".to_vec()];
         Ok(Self {
             roles: roles(own),
+            days,
             connector: TlsConnector::from(Arc::new(client)),
             acceptor: TlsAcceptor::from(Arc::new(server)),
         })
+    }
+
+    /// What the certificate entitles to.
+    pub fn roles(&self) -> &[Role] {
+        &self.roles
+    }
+
+    /// Whole days for which it and its authority stay valid, counted to a hundred years.
+    pub fn days_left(&self) -> u64 {
+        self.days
     }
 
     /// Whether others will take this process for one of that role: a server has to know, since nobody
@@ -170,6 +183,23 @@ impl Tls {
             found: words(&self.roles),
         })
     }
+}
+
+/// Whole days from now at which a certificate that is valid still is: the library that verifies does not
+/// tell the end.
+fn days_left(valid: impl Fn(UnixTime) -> bool) -> u64 {
+    let now = UnixTime::now().as_secs();
+    let after = |days: u64| UnixTime::since_unix_epoch(Duration::from_secs(now + days * 86_400));
+    let (mut valid_after, mut invalid_after) = (0, 36_525);
+    while invalid_after - valid_after > 1 {
+        let middle = u64::midpoint(valid_after, invalid_after);
+        if valid(after(middle)) {
+            valid_after = middle;
+        } else {
+            invalid_after = middle;
+        }
+    }
+    valid_after
 }
 
 /// All certificates of a PEM file; `None` if there is none, or one is broken.
@@ -344,6 +374,18 @@ mod tests {
         }
         let both = format!("{}{}", theirs.pem, ours.pem);
         assert!(load(&both, &certificate, &key).is_ok(), "one of several");
+    }
+
+    #[test]
+    fn a_certificate_knows_its_days() {
+        let authority = authority();
+        let (certificate, key) = issue(&authority, &[], -1);
+        let tls = load(&authority.pem, &certificate, &key).expect("valid");
+        assert_eq!(
+            tls.days_left(),
+            1,
+            "of the two that are left the second ends today"
+        );
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use hyper_util::rt::TokioIo;
-use tokio::io::AsyncBufReadExt;
+use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use tokio_rustls::TlsConnector;
 use tokio_rustls::client::TlsStream;
@@ -143,6 +143,68 @@ where
     };
     refused.tell();
     served
+}
+
+/// Bytes of the word by which [`answer`] is known.
+pub const WORD: usize = 16;
+
+/// Dials `address` and hears whether somebody there says `word`, as [`answer`] does.
+///
+/// # Errors
+/// Why not, in words.
+pub async fn reach(
+    address: &str,
+    role: Role,
+    tls: Option<&Tls>,
+    word: &[u8; WORD],
+) -> Result<(), String> {
+    let hear = async {
+        let mut heard = [0; WORD];
+        match tls {
+            None => {
+                TcpStream::connect(address)
+                    .await?
+                    .read_exact(&mut heard)
+                    .await?
+            }
+            Some(tls) => {
+                let stream = dial(address.to_owned(), role, tls.connector.clone()).await?;
+                stream.into_inner().read_exact(&mut heard).await?
+            }
+        };
+        Ok::<_, io::Error>(heard)
+    };
+    match tokio::time::timeout(CONNECT, hear).await {
+        Ok(Ok(heard)) if heard == *word => Ok(()),
+        Ok(Ok(_)) => Err("somebody else answers there".to_owned()),
+        Ok(Err(error)) => Err(match Trouble::of(&error, role) {
+            Trouble::Untrusted(why) | Trouble::Unreachable(why) | Trouble::Broken(why) => why,
+        }),
+        Err(_) => Err(format!("nobody answers within {} s", CONNECT.as_secs())),
+    }
+}
+
+/// Says `word` to whoever connects, one after the other, until it is dropped.
+pub async fn answer(listener: &TcpListener, tls: Option<&Tls>, word: &[u8; WORD]) {
+    while let Ok((mut socket, _)) = listener.accept().await {
+        let say = async {
+            let mut nothing = [0];
+            match tls {
+                None => {
+                    socket.write_all(word).await?;
+                    socket.read(&mut nothing).await
+                }
+                Some(tls) => {
+                    let mut stream = tls.acceptor.accept(socket).await?;
+                    stream.write_all(word).await?;
+                    stream.flush().await?;
+                    stream.read(&mut nothing).await
+                }
+            }
+        };
+        // Whoever connected may have gone by now.
+        let _ = tokio::time::timeout(CONNECT, say).await;
+    }
 }
 
 /// What may help where a plain connection broke before anything was heard.

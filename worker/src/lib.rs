@@ -29,7 +29,7 @@ use tokio_util::sync::CancellationToken;
 use tracing::info;
 
 pub use error::{Error, Result};
-pub use rendezvous::Rendezvous;
+pub use rendezvous::{Rendezvous, reachable};
 
 /// What a worker has to know.
 #[derive(Debug, Clone)]

@@ -26,8 +26,11 @@ impl fmt::Display for Rendezvous {
 }
 
 impl Rendezvous {
-    /// Where the master is by now, or why nobody knows.
-    pub(crate) async fn look(&self) -> Result<String, String> {
+    /// Where the master is by now.
+    ///
+    /// # Errors
+    /// Why nobody knows.
+    pub async fn look(&self) -> Result<String, String> {
         let file = match self {
             Self::Address(address) => return Ok(address.clone()),
             Self::File(file) => file.clone(),
@@ -46,7 +49,7 @@ impl Rendezvous {
 
 /// The listener's address as others see it: a listener on every interface is reached at the one
 /// that leads to the master.
-pub(crate) fn reachable(bound: SocketAddr, master: &str) -> SocketAddr {
+pub fn reachable(bound: SocketAddr, master: &str) -> SocketAddr {
     if !bound.ip().is_unspecified() {
         return bound;
     }
