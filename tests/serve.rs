@@ -217,6 +217,48 @@ fn what_takes_too_long_is_left_to_the_store_and_a_second_signal_waits_for_nothin
 }
 
 #[test]
+fn a_worker_whose_master_goes_for_good_in_the_middle_of_a_job_says_so() {
+    let dir = scratch();
+    let (first, address) = master(&["--lease", "1"]);
+    let args = [
+        "worker",
+        "--master",
+        &address,
+        "--id",
+        "w",
+        "--threads",
+        "1",
+    ];
+    let mut worker = Process::start("w", &[&args[..], &["--patience", "1"]].concat(), "debug");
+    worker.wait_for(&["registered"]);
+    detach(&long_job(dir.path()), &address, &[]);
+    worker.wait_for(&["going on", "jobs=[1]"]);
+    drop(first);
+    let (code, log) = worker.end();
+    assert_eq!(code, Some(4), "{log}");
+    assert!(log.contains("1 of its jobs were under way"), "{log}");
+}
+
+#[test]
+fn a_small_job_is_done_in_the_middle_of_a_big_one() {
+    let dir = scratch();
+    let (long, short) = (long_job(dir.path()), short_job(dir.path()));
+    let alone = path_of(&short, dir.path(), "alone", &[]);
+    let (_master, address) = master(&[]);
+    let mut worker = worker(&address, "w");
+    // These make it several extents, and do none of them.
+    let others = ["a", "b", "c", "d", "e"].map(|id| common::worker(&address, id));
+    others.iter().for_each(|other| other.signal("-STOP"));
+    let big = detach(&long, &address, &["--points-per-revolution", "900"]);
+    worker.wait_for(&["positions", "first="]);
+    drop(others);
+    let small = detach(&short, &address, &[]);
+    assert!(fetched(&address, &small, &dir.path().join("out")) == alone);
+    assert_eq!(status(&address, &big)["stage"], "running", "far from done");
+    succeed(&["cancel", &big, "--master", &address]);
+}
+
+#[test]
 fn queued_jobs_are_there_when_the_master_is_killed() {
     let dir = scratch();
     let job = short_job(dir.path());

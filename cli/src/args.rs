@@ -609,7 +609,7 @@ pub(crate) struct Master {
 
 /// How much a master takes upon itself.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Limits, beyond which it refuses")]
+#[command(next_help_heading = "Limits, beyond which it refuses and says so")]
 pub(crate) struct Limits {
     /// Largest part that a client may send, MB
     #[arg(
@@ -622,6 +622,9 @@ pub(crate) struct Limits {
     /// Jobs that wait or are under way
     #[arg(long, value_name = "N", env = "HORMA_MAX_JOBS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_jobs: u32,
+    /// Connections of workers and clients at once; beyond that they wait until others are closed
+    #[arg(long, value_name = "N", env = "HORMA_MAX_CONNECTIONS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_connections: u32,
     /// Calls of clients that are open at once; who waits for a job has one open
     #[arg(long, value_name = "N", env = "HORMA_MAX_CALLS", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_calls: u32,
@@ -679,7 +682,8 @@ pub(crate) struct Worker {
     /// best there is]
     #[arg(long, value_name = "SET", env = "HORMA_SIMD")]
     pub simd: Option<Simd>,
-    /// How long to look for a master that is not there, or not there any more, seconds. To be left by
+    /// How long to look for a master that is not there, or not there any more, seconds. After that the
+    /// worker ends: with exit code 0 if nothing was going on, else with 4. To be left by
     /// a master is the end of the work and exit code 0; never to find one is 4
     #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
     pub patience: u64,

@@ -56,6 +56,7 @@ pub(crate) async fn start(workers: u32, threads: usize, simd: Simd) -> Result<Lo
         source,
     })?;
     let config = Config {
+        connections: 1000,
         heartbeat: Duration::from_millis(500),
         lease: Duration::from_secs(10),
         patience: START,

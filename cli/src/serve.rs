@@ -25,6 +25,7 @@ pub(crate) fn master(args: &Master) -> Result<()> {
     let tls = tls::load_as(&args.tls, Role::Master)?;
     let trusted = tls.is_some() || args.insecure;
     let config = Config {
+        connections: args.limits.max_connections as usize,
         heartbeat: Duration::from_secs(args.lease) / 5,
         lease: Duration::from_secs(args.lease),
         patience: Duration::from_secs(args.patience),

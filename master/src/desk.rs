@@ -4,6 +4,8 @@
 //! goes, and keeps results. What it knows it has from the store, and every change is in the store
 //! before anybody hears of it. It knows nothing of workers or extents.
 
+mod rules;
+
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -17,20 +19,21 @@ use tokio_util::sync::CancellationToken;
 use tonic::Status;
 use tracing::{error, info, warn};
 
+use self::rules::{Expired, Work, expired, next};
 use crate::error::{Error, Result};
 use crate::journal::Journal;
 use crate::store::{Entry, Gone, Stage, Store};
 use crate::submission::{self, Submission};
 use crate::{Limits, Master, Progress, result};
 
+/// What a client is told.
+type Answer<T> = std::result::Result<T, Refusal>;
+
 /// How often is looked for results that are too old.
 const EXPIRY: Duration = Duration::from_secs(10);
 
 /// Parts that come in at once; others wait.
 const PARTS: usize = 4;
-
-/// Jobs that are over and still known: the oldest are forgotten beyond that.
-const REMEMBERED: usize = 10_000;
 
 pub(crate) struct Desk {
     store: Arc<Store>,
@@ -63,15 +66,6 @@ pub(crate) struct View {
     pub entry: Entry,
     /// Phase, how much of it is done, and of how much.
     pub progress: (&'static str, u64, u64),
-}
-
-/// What is being done for a job.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Work {
-    Nothing,
-    /// One at a time, so that jobs begin in their order.
-    Planning,
-    Digitizing,
 }
 
 impl Desk {
@@ -127,7 +121,7 @@ impl Desk {
     }
 
     /// A client's call, for as long as this is held.
-    pub fn call(&self) -> std::result::Result<OwnedSemaphorePermit, Refusal> {
+    pub fn call(&self) -> Answer<OwnedSemaphorePermit> {
         let call = self.calls.clone().try_acquire_owned();
         call.map_err(|_| {
             let limit = self.limits.calls;
@@ -138,7 +132,7 @@ impl Desk {
     }
 
     /// Waits until a part may come in: each is in memory until it is in the store.
-    pub async fn part(&self) -> std::result::Result<SemaphorePermit<'_>, Refusal> {
+    pub async fn part(&self) -> Answer<SemaphorePermit<'_>> {
         let part = self.parts.acquire().await;
         part.map_err(|_| Refusal::ShuttingDown("the master"))
     }
@@ -152,7 +146,7 @@ impl Desk {
     }
 
     /// A place for one more job.
-    pub fn place(&self) -> std::result::Result<OwnedSemaphorePermit, Refusal> {
+    pub fn place(&self) -> Answer<OwnedSemaphorePermit> {
         if self.master.draining.is_cancelled() {
             return Err(Refusal::ShuttingDown("the master"));
         }
@@ -170,18 +164,14 @@ impl Desk {
         self: &Arc<Self>,
         submission: Submission,
         place: OwnedSemaphorePermit,
-    ) -> std::result::Result<u64, Refusal> {
+    ) -> Answer<u64> {
         let desk = self.clone();
         let taking = spawn_blocking(move || desk.take_in(submission, place));
         let stopping = |_| Refusal::ShuttingDown("the master");
         taking.await.map_err(stopping)?
     }
 
-    fn take_in(
-        &self,
-        submission: Submission,
-        place: OwnedSemaphorePermit,
-    ) -> std::result::Result<u64, Refusal> {
+    fn take_in(&self, submission: Submission, place: OwnedSemaphorePermit) -> Answer<u64> {
         let Submission {
             key,
             name,
@@ -218,14 +208,14 @@ impl Desk {
     }
 
     /// A job as it goes on.
-    pub fn watch(&self, job: u64) -> std::result::Result<watch::Receiver<View>, Refusal> {
+    pub fn watch(&self, job: u64) -> Answer<watch::Receiver<View>> {
         let jobs = self.lock();
         let known = jobs.get(&job).ok_or_else(|| unknown(job))?;
         Ok(known.view.subscribe())
     }
 
     /// Ends a job, unless it is over.
-    pub async fn cancel(self: &Arc<Self>, job: u64) -> std::result::Result<(), Refusal> {
+    pub async fn cancel(self: &Arc<Self>, job: u64) -> Answer<()> {
         drop(self.watch(job)?);
         let end = move |store: &Store| store.end(job, Stage::Cancelled { at: now() });
         self.change(job, end).await.map_err(Refusal::from)
@@ -235,11 +225,11 @@ impl Desk {
     pub async fn result(&self, job: u64, piece: u32) -> Result<Option<Bytes>> {
         let store = self.store.clone();
         let reading = spawn_blocking(move || store.result(job, piece));
-        reading.await.map_err(|_| Error::Interrupted)?
+        reading.await.map_err(|_| Error::Panicked)?
     }
 
     /// Drops a result that the client has.
-    pub async fn discard(self: &Arc<Self>, job: u64) -> std::result::Result<(), Refusal> {
+    pub async fn discard(self: &Arc<Self>, job: u64) -> Answer<()> {
         drop(self.watch(job)?);
         let discard = move |store: &Store| store.drop_result(job, Gone::Fetched);
         self.change(job, discard).await.map_err(Refusal::from)
@@ -253,7 +243,7 @@ impl Desk {
     ) -> Result<()> {
         let store = self.store.clone();
         let changing = spawn_blocking(move || how(&store));
-        if let Some(stage) = changing.await.map_err(|_| Error::Interrupted)?? {
+        if let Some(stage) = changing.await.map_err(|_| Error::Panicked)?? {
             self.show(job, stage);
         }
         Ok(())
@@ -270,7 +260,9 @@ impl Desk {
             known.place = None;
         }
         known.view.send_if_modified(|view| {
-            let changed = view.entry.stage != stage;
+            // What is over stays so, whoever is late to say that it goes on.
+            let over = stage.is_open() && !view.entry.stage.is_open();
+            let changed = !over && view.entry.stage != stage;
             if changed {
                 info!(job, ?stage, "job");
                 view.entry.stage = stage;
@@ -308,37 +300,38 @@ impl Desk {
     async fn work(self: Arc<Self>, job: u64) {
         let stop = self.lock().get(&job).map(|known| known.stop.clone());
         let stop = stop.unwrap_or_default();
-        let outcome = tokio::select! {
-            outcome = self.perform(job) => outcome,
+        let kept = tokio::select! {
+            kept = self.perform_and_keep(job) => kept,
             // Whoever stopped it has said why.
-            () = stop.cancelled() => Err(Error::Interrupted),
-            () = self.shutdown.cancelled() => Err(Error::Interrupted),
+            () = stop.cancelled() => Ok(()),
+            () = self.shutdown.cancelled() => return,
         };
-        let kept = match outcome {
+        if let Err(error) = kept {
+            error!(job, %error, "the end of this job is not in the store; the next start does it again");
+            self.show(job, failed(error));
+        }
+        self.set_work(job, Work::Nothing);
+    }
+
+    /// Runs a job and puts what comes of it into the store: the result, or why there is none.
+    async fn perform_and_keep(self: &Arc<Self>, job: u64) -> Result<()> {
+        let kept = match self.perform(job).await {
             Ok(pieces) => {
                 let finish = move |store: &Store| store.finish(job, now(), &pieces);
                 self.change(job, finish).await
             }
             Err(error) => Err(error),
         };
-        let kept = match kept {
-            Err(Error::Interrupted) | Ok(()) => Ok(()),
-            Err(error) => {
-                warn!(job, %error, "failed");
-                let status = Status::from(Refusal::from(error));
-                let stage = Stage::Failed {
-                    at: now(),
-                    code: status.code().into(),
-                    reason: status.message().to_owned(),
-                };
-                let end = move |store: &Store| store.end(job, stage);
-                self.change(job, end).await
-            }
+        let error = match kept {
+            Ok(()) => return Ok(()),
+            // It is not over: the next start goes on with it.
+            Err(Error::Interrupted) if self.shutdown.is_cancelled() => return Ok(()),
+            Err(error) => error,
         };
-        if let Err(error) = kept {
-            error!(job, %error, "the store did not take the end of this job; it goes on at the next start");
-        }
-        self.set_work(job, Work::Nothing);
+        warn!(job, %error, "failed");
+        let stage = failed(error);
+        self.change(job, move |store: &Store| store.end(job, stage))
+            .await
     }
 
     /// Plans a job, has it digitized, and makes pieces of the result.
@@ -348,7 +341,7 @@ impl Desk {
             let again = submission::again(store.submission(job)?);
             again.map_err(|e| Error::StoreDamaged(format!("job {job}: {e}")))
         });
-        let sent = read.await.map_err(|_| Error::Interrupted)??;
+        let sent = read.await.map_err(|_| Error::Panicked)??;
         let (progress, memory) = (self.progress(job), self.share(job));
         progress("discretize", 0, 0);
         let planning = self.master.plan(sent.part, sent.job, sent.sharing, memory);
@@ -370,7 +363,7 @@ impl Desk {
         self.set_work(job, Work::Digitizing);
         let outcome = running.end().await?;
         let pieces = spawn_blocking(move || result::to_pieces(&outcome));
-        pieces.await.map_err(|_| Error::Interrupted)?
+        pieces.await.map_err(|_| Error::Panicked)?
     }
 
     /// Tells how far a job is, for as long as it is known.
@@ -454,45 +447,14 @@ impl Known {
     }
 }
 
-/// The first job that waits, if it may begin beside those under way: jobs that are not over, each with
-/// the memory it takes and what is being done for it. None overtakes another, so none waits for ever.
-fn next(open: &[(u64, u64, Work)], at_once: usize, memory: u64) -> Option<u64> {
-    let (waiting, busy): (Vec<_>, Vec<_>) = open.iter().partition(|job| job.2 == Work::Nothing);
-    let &&(next, needed, _) = waiting.first()?;
-    let taken = busy
-        .iter()
-        .fold(0, |sum: u64, job| sum.saturating_add(job.1));
-    let planning = busy.iter().any(|job| job.2 == Work::Planning);
-    let fits = busy.is_empty() || taken.saturating_add(needed) <= memory;
-    (fits && !planning && busy.len() < at_once).then_some(next)
-}
-
-/// What is not kept any longer.
-#[derive(Debug, PartialEq, Eq, Default)]
-struct Expired {
-    /// Jobs whose results go.
-    dropped: Vec<u64>,
-    /// Jobs that are forgotten altogether.
-    forgotten: Vec<u64>,
-}
-
-/// Results go when they are too old, and the oldest when all take too much; jobs go when they ended long
-/// ago, and the oldest when there are too many. Of each: when it ended, its number, its result's bytes.
-fn expired(mut ended: Vec<(Duration, u64, u64)>, limits: &Limits, now: Duration) -> Expired {
-    // The newest first.
-    ended.sort_unstable_by(|a, b| b.cmp(a));
-    let mut all = Expired::default();
-    let mut kept = 0u64;
-    for (i, &(at, job, bytes)) in ended.iter().enumerate() {
-        let age = now.saturating_sub(at);
-        kept = kept.saturating_add(bytes);
-        if i >= REMEMBERED || (bytes == 0 && age > limits.keep) {
-            all.forgotten.push(job);
-        } else if bytes > 0 && (age > limits.keep || kept > limits.keep_bytes) {
-            all.dropped.push(job);
-        }
+/// A job that came to nothing, as its client is going to be told.
+fn failed(error: Error) -> Stage {
+    let status = Status::from(Refusal::from(error));
+    Stage::Failed {
+        at: now(),
+        code: status.code().into(),
+        reason: status.message().to_owned(),
     }
-    all
 }
 
 fn now() -> Duration {
@@ -504,54 +466,4 @@ fn unknown(job: u64) -> Refusal {
     Refusal::NoSuchJob(format!(
         "there is no job {job} here; `horma status` lists those there are"
     ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use Work::{Digitizing, Nothing, Planning};
-
-    #[test]
-    fn jobs_begin_in_order_as_far_as_memory_goes() {
-        let check = |open: &[(u64, u64, Work)], expected| {
-            assert_eq!(next(open, 3, 100), expected, "{open:?}");
-        };
-        check(&[], None);
-        check(&[(1, 500, Nothing)], Some(1));
-        check(&[(1, 50, Planning), (2, 1, Nothing)], None);
-        check(&[(1, 50, Digitizing), (2, 50, Nothing)], Some(2));
-        check(&[(1, 50, Digitizing), (2, 51, Nothing)], None);
-        // The big one is not overtaken for ever.
-        let big = [(1, 50, Digitizing), (2, 51, Nothing), (3, 1, Nothing)];
-        check(&big, None);
-        let three = [1, 2, 3].map(|job| (job, 1, Digitizing));
-        check(&[&three[..], &[(4, 1, Nothing)]].concat(), None);
-        check(&[(1, u64::MAX, Digitizing), (2, u64::MAX, Nothing)], None);
-    }
-
-    #[test]
-    fn results_are_dropped_by_age_and_by_size_and_jobs_forgotten_later() {
-        let limits = Limits {
-            part: 0,
-            queue: 1,
-            calls: 1,
-            running: 1,
-            keep_bytes: 100,
-            keep: Duration::from_secs(10),
-        };
-        let at = Duration::from_secs;
-        let check = |ended: &[(u64, u64)], dropped: &[u64], forgotten: &[u64]| {
-            let numbered = (1..).zip(ended);
-            let ended = numbered.map(|(job, &(seconds, bytes))| (at(seconds), job, bytes));
-            let all = expired(ended.collect(), &limits, at(100));
-            assert_eq!((&all.dropped[..], &all.forgotten[..]), (dropped, forgotten));
-        };
-        check(&[(95, 50), (96, 50)], &[], &[]);
-        check(&[(89, 1), (95, 1)], &[1], &[]);
-        check(&[(89, 0), (95, 0)], &[], &[1]);
-        check(&[(95, 40), (97, 30), (96, 40)], &[1], &[]);
-        check(&[(95, 101)], &[1], &[]);
-        let many = vec![(95, 0); REMEMBERED + 1];
-        check(&many, &[], &[1]);
-    }
 }

@@ -45,6 +45,9 @@ pub enum Error {
     /// The master is stopping.
     #[error("the master was stopped before the job was done")]
     Interrupted,
+    /// A thread of the master ended unexpectedly.
+    #[error("a thread of the master panicked; please report this with the job")]
+    Panicked,
     /// The store cannot be opened.
     #[error("the store {} cannot be used: {reason}", file.display())]
     StoreUnusable {

@@ -37,7 +37,7 @@ impl Journal {
     /// dropped.
     pub async fn resume(self, plan: Arc<Handout>, workers: u32) -> Result<Resumed> {
         let resuming = spawn_blocking(move || self.find(&plan, workers));
-        resuming.await.map_err(|_| Error::Interrupted)?
+        resuming.await.map_err(|_| Error::Panicked)?
     }
 
     fn find(self, plan: &Handout, workers: u32) -> Result<Resumed> {

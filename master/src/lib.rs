@@ -48,6 +48,8 @@ pub use run::Master;
 pub struct Config {
     /// What proves who is who; without it traffic is plain and anybody may call.
     pub tls: Option<Tls>,
+    /// Connections at once; more wait until others are closed.
+    pub connections: usize,
     /// How often a worker is to say that it is alive.
     pub heartbeat: Duration,
     /// After how long a silence a worker counts as lost.
@@ -109,6 +111,7 @@ pub fn start(
     config: Config,
     shutdown: CancellationToken,
 ) -> Result<(Master, JoinHandle<Result<()>>)> {
+    let connections = config.connections;
     let (tls, clients, heartbeat) = (config.tls.clone(), config.clients.clone(), config.heartbeat);
     let store = clients
         .as_ref()
@@ -136,7 +139,13 @@ pub fn start(
         .max_encoding_message_size(MAX_MESSAGE);
     let failed = |e| Error::Serve(Arc::new(e));
     let serving = tokio::spawn(async move {
-        let server = transport::serve(service, listener, tls.as_ref(), shutdown.cancelled());
+        let server = transport::serve(
+            service,
+            listener,
+            connections,
+            tls.as_ref(),
+            shutdown.cancelled(),
+        );
         let mut server = std::pin::pin!(server);
         tokio::select! {
             served = &mut server => return served.map_err(failed),

@@ -110,7 +110,7 @@ impl Master {
         let here = self.config.workers_here;
         let plan = move || Handout::new(&part, job, sharing, memory, here);
         let planned = spawn_blocking(plan).await;
-        let plan = planned.map_err(|_| Error::Interrupted)?;
+        let plan = planned.map_err(|_| Error::Panicked)?;
         Ok(Planned {
             plan: Arc::new(plan.map_err(Error::Plan)?),
             took: begin.elapsed(),

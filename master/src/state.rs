@@ -37,6 +37,9 @@ pub(crate) struct State {
     patience: Duration,
     workers: BTreeMap<String, Worker>,
     jobs: BTreeMap<u64, Vec<Extent>>,
+    /// How many times anybody was given anything, and how many that were when each job had its last turn.
+    turn: u64,
+    turns: BTreeMap<u64, u64>,
     /// Since when there has been nobody, and how the last one was lost.
     deserted: Option<Duration>,
     last_loss: Option<String>,
@@ -280,6 +283,7 @@ pub(crate) fn apply(state: &mut State, now: Duration, event: Event) -> Vec<Comma
                 extents[number as usize].status = Status::Done;
             }
             state.jobs.insert(job, extents);
+            state.turns.insert(job, state.turn);
             complete(state, job, &mut commands);
         }
         Event::Cancelled { job } => {

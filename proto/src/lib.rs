@@ -12,6 +12,7 @@ mod span;
 mod task;
 
 mod accept;
+mod limit;
 mod refused;
 pub mod tls;
 pub mod transport;

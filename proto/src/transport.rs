@@ -21,9 +21,9 @@ use tonic::transport::{Channel, Endpoint, Server};
 use tower::Service;
 use tower::util::MapResponseLayer;
 
-use crate::accept;
 use crate::refused::Refused;
 use crate::tls::{Role, Tls};
+use crate::{accept, limit};
 
 /// Longest time to connect.
 const CONNECT: Duration = Duration::from_secs(5);
@@ -96,7 +96,8 @@ async fn dial(address: String, role: Role, connector: TlsConnector) -> io::Resul
     Ok(TokioIo::new(stream))
 }
 
-/// Serves on `listener` until `shutdown` and the end of all open calls; then the log is told what was
+/// Serves on `listener` until `shutdown` and the end of all open calls, at most so many connections at
+/// once: more wait until others are closed. Then the log is told what was
 /// refused.
 ///
 /// # Errors
@@ -104,6 +105,7 @@ async fn dial(address: String, role: Role, connector: TlsConnector) -> io::Resul
 pub async fn serve<S>(
     service: S,
     listener: TcpListener,
+    connections: usize,
     tls: Option<&Tls>,
     shutdown: impl Future<Output = ()>,
 ) -> Result<(), tonic::transport::Error>
@@ -132,11 +134,13 @@ where
     let served = match tls {
         None => {
             let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+            let incoming = limit::at_most(connections, incoming);
             let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
             serving.await
         }
         Some(tls) => {
             let incoming = accept::secured(listener, tls.acceptor.clone(), refused.clone());
+            let incoming = limit::at_most(connections, incoming);
             let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
             serving.await
         }

@@ -21,6 +21,16 @@ pub enum Error {
         /// The last error.
         reason: String,
     },
+    /// The master is gone, and was not done.
+    #[error("the master at {address} did not come back within {} s while {jobs} of its jobs were under way; start it again on its store, and the workers", waited.as_secs())]
+    MasterGone {
+        /// Where it was.
+        address: String,
+        /// For how long it was looked for.
+        waited: Duration,
+        /// How many jobs were going on.
+        jobs: usize,
+    },
     /// The master does not want this worker.
     #[error("the master at {address} refuses this worker: {reason}")]
     Refused {

@@ -53,6 +53,9 @@ pub struct Config {
     pub patience: Duration,
 }
 
+/// Connections at once, of the master and of other workers; more wait until others are closed.
+const CONNECTIONS: usize = 1000;
+
 /// How long open tasks may take to notice a shutdown.
 const DRAIN: Duration = Duration::from_secs(5);
 
@@ -83,10 +86,9 @@ pub async fn run(listener: TcpListener, config: Config, leave: CancellationToken
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
     let (tls, stopped) = (config.tls.clone(), shutdown.clone().cancelled_owned());
-    let serving =
-        tokio::spawn(
-            async move { transport::serve(service, listener, tls.as_ref(), stopped).await },
-        );
+    let serving = tokio::spawn(async move {
+        transport::serve(service, listener, CONNECTIONS, tls.as_ref(), stopped).await
+    });
     let outcome = membership::keep(&config, bound, &store, &leave).await;
     // Membership is what a worker lives for: without it there is nobody to serve.
     shutdown.cancel();

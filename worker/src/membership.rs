@@ -11,7 +11,7 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
 use tonic::transport::Channel;
-use tracing::{info, warn};
+use tracing::{debug, info, warn};
 
 use crate::Config;
 use crate::error::{Error, Result};
@@ -26,7 +26,8 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 const DEADLINE: Duration = Duration::from_secs(5);
 
 /// Keeps this worker a member until it is told to leave, or until the master has been silent for longer than
-/// the worker's patience: then there is no more work, which is no error if there ever was a master.
+/// the worker's patience: then there is no more work, which is no error if there ever was a master and
+/// nothing was going on there.
 pub(crate) async fn keep(
     config: &Config,
     bound: SocketAddr,
@@ -35,6 +36,7 @@ pub(crate) async fn keep(
 ) -> Result<()> {
     let member = async {
         let mut heard: Option<Instant> = None;
+        let mut going = Vec::new();
         let begin = Instant::now();
         let mut pause = FIRST_PAUSE;
         loop {
@@ -49,7 +51,8 @@ pub(crate) async fn keep(
                             info!(master, address, "registered");
                             store.keep_master(incarnation);
                             pause = FIRST_PAUSE;
-                            let silence = heartbeats(&mut client, config, store, interval).await;
+                            let silence =
+                                heartbeats(&mut client, config, store, interval, &mut going).await;
                             heard = Some(Instant::now());
                             silence
                         }
@@ -64,7 +67,12 @@ pub(crate) async fn keep(
             warn!(master = %config.master, reason, "no answer");
             if heard.unwrap_or(begin).elapsed() >= config.patience {
                 return match heard {
-                    Some(_) => Ok(()),
+                    Some(_) if going.is_empty() => Ok(()),
+                    Some(_) => Err(Error::MasterGone {
+                        address: config.master.to_string(),
+                        waited: config.patience,
+                        jobs: going.len(),
+                    }),
                     None => Err(Error::NoMaster {
                         address: config.master.to_string(),
                         waited: config.patience,
@@ -147,12 +155,13 @@ async fn register(
     Ok((interval, reply.master))
 }
 
-/// Sends heartbeats until one fails; drops the rows of jobs that are over.
+/// Sends heartbeats until one fails; drops the rows of jobs that are over, and notes which go on.
 async fn heartbeats(
     client: &mut MasterClient<Channel>,
     config: &Config,
     store: &Store,
     interval: Duration,
+    going: &mut Vec<u64>,
 ) -> Status {
     loop {
         tokio::time::sleep(interval).await;
@@ -164,6 +173,10 @@ async fn heartbeats(
             Ok(reply) => {
                 let reply = reply.into_inner();
                 store.keep_jobs(&reply.jobs, reply.next_job);
+                if *going != reply.jobs {
+                    debug!(jobs = ?reply.jobs, "going on");
+                    *going = reply.jobs;
+                }
             }
             Err(status) => return status,
         }

@@ -1,6 +1,6 @@
 //! Who does what next: idle workers are given what waits, one at a time to the job at which the fewest
-//! are, so that a small one is not stuck behind a big one; among such the oldest, and of it the lowest
-//! extent. Who has been faster so far comes first, and holds more rows.
+//! are, so that a small one is not stuck behind a big one; among such the one whose turn it is, and of it
+//! the lowest extent. Who has been faster so far comes first, and holds more rows.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -30,19 +30,22 @@ pub(super) fn assign(state: &mut State, now: Duration, commands: &mut Vec<Comman
             && let Some(worker) = state.workers.get_mut(worker)
         {
             worker.take(now, *task, step);
+            state.turn += 1;
+            state.turns.insert(task.job, state.turn);
         }
         commands.push(command);
     }
 }
 
-/// The jobs, those first at which the fewest workers are.
-fn in_turn(state: &State) -> Vec<u64> {
+/// The jobs, those first at which the fewest workers are, and of such those whose last turn is longest ago.
+fn in_turn(state: &mut State) -> Vec<u64> {
+    state.turns.retain(|job, _| state.jobs.contains_key(job));
     let mut at: BTreeMap<u64, u32> = state.jobs.keys().map(|&job| (job, 0)).collect();
     for (task, _) in state.workers.values().filter_map(|w| w.task) {
         *at.entry(task.job).or_default() += 1;
     }
     let mut jobs: Vec<u64> = state.jobs.keys().copied().collect();
-    jobs.sort_by_key(|job| at[job]);
+    jobs.sort_by_key(|job| (at[job], state.turns.get(job)));
     jobs
 }
 

@@ -550,6 +550,32 @@ fn a_small_job_is_not_stuck_behind_a_big_one() {
 }
 
 #[test]
+fn jobs_take_turns_at_the_only_worker() {
+    let mut state = State::new(LEASE, LEASE);
+    started(&mut state, arrives("a"));
+    let mut turns = started(&mut state, submitted(1, 4));
+    started(&mut state, submitted(2, 2));
+    while let Some(&(job, extent)) = turns.last() {
+        let task = TaskId {
+            job,
+            extent,
+            attempt: 1,
+        };
+        let through = Event::Delivered {
+            worker: "a".to_owned(),
+            task,
+            left: 0,
+        };
+        let next = started(&mut state, through);
+        if next.is_empty() {
+            break;
+        }
+        turns.extend(next);
+    }
+    assert_eq!(turns, [(1, 0), (1, 1), (2, 0), (1, 2), (2, 1), (1, 3)]);
+}
+
+#[test]
 fn what_a_worker_leaves_is_for_others_and_nobodys_failure() {
     let mut state = State::new(LEASE, LEASE);
     started(&mut state, arrives("a"));
