@@ -1,5 +1,6 @@
 //! A master elsewhere: how it is called, for how long it is looked for, and what its answers mean.
 
+use std::cell::Cell;
 use std::time::Duration;
 
 use horma_proto::transport::{self, Trouble, WANTS_TLS};
@@ -27,6 +28,8 @@ pub(crate) struct Remote {
     pub address: String,
     tls: Option<Tls>,
     patience: Duration,
+    /// When it was last heard of, by any call.
+    heard: Cell<Option<Instant>>,
 }
 
 impl Remote {
@@ -36,6 +39,7 @@ impl Remote {
             address: args.master.clone(),
             tls: tls::load(&args.tls)?,
             patience: Duration::from_secs(args.patience),
+            heard: Cell::new(None),
         })
     }
 
@@ -45,25 +49,26 @@ impl Remote {
         &self,
         mut call: impl AsyncFnMut(Client, &mut Instant) -> std::result::Result<T, Failure>,
     ) -> Result<T> {
-        let mut heard: Option<Instant> = None;
         let mut pause = FIRST_PAUSE;
         loop {
             let outcome = match self.connect().await {
                 Ok(mut client) => {
-                    if heard.is_none() {
-                        self.greet(&mut client).await?;
-                    }
-                    let before = *heard.get_or_insert_with(Instant::now);
+                    let before = match self.heard.get() {
+                        Some(at) => at,
+                        None => self.greet(&mut client).await?,
+                    };
+                    self.heard.set(Some(before));
                     let mut latest = before;
                     let outcome = call(client, &mut latest).await;
                     if latest > before {
-                        (heard, pause) = (Some(latest), FIRST_PAUSE);
+                        self.heard.set(Some(latest));
+                        pause = FIRST_PAUSE;
                     }
                     outcome.map_err(|failure| self.meaning(failure))
                 }
                 Err(error) => Err(error),
             };
-            match (outcome, heard) {
+            match (outcome, self.heard.get()) {
                 (Err(Error::NoMaster { .. }), Some(at)) if at.elapsed() < self.patience => {}
                 (outcome, _) => return outcome,
             }
@@ -84,8 +89,8 @@ impl Remote {
             .max_encoding_message_size(MAX_MESSAGE))
     }
 
-    /// Makes sure that it is a master that took the connection: there is no job 0.
-    async fn greet(&self, client: &mut Client) -> Result<()> {
+    /// Makes sure that it is a master that took the connection: there is no job 0. Returns when it was.
+    async fn greet(&self, client: &mut Client) -> Result<Instant> {
         let nobody = StatusRequest {
             job: Some(0),
             after: 0,
@@ -94,7 +99,7 @@ impl Remote {
             Err(status) if Answer::of(&status) != Answer::Stranger => {
                 Err(self.meaning(status.into()))
             }
-            Ok(_) | Err(_) => Ok(()),
+            Ok(_) | Err(_) => Ok(Instant::now()),
         }
     }
 

@@ -28,6 +28,9 @@ use crate::{Master, result};
 /// Replies that may wait for a client.
 const WAITING_REPLIES: usize = 16;
 
+/// How often a client that waits hears of the master, at least.
+const AGAIN: Duration = Duration::from_secs(2);
+
 /// Jobs in one answer.
 const STATUSES: usize = 1000;
 
@@ -284,7 +287,8 @@ async fn fetch(
                 let progress = Reply::Progress(progress_to_wire(progress));
                 let kind = Some(progress);
                 send(replies, PathReply { kind }).await?;
-                if watched.changed().await.is_err() {
+                // Said again when nothing changes: who waits is to know that the master is there.
+                if let Ok(Err(_)) = timeout(AGAIN, watched.changed()).await {
                     return Err(Error::ShuttingDown("the master").into());
                 }
             }

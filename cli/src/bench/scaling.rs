@@ -27,8 +27,12 @@ use runs::{Case, Run};
 /// What was measured, and on what.
 #[derive(Debug)]
 struct Experiment {
+    /// What was typed.
+    command: String,
     /// Part, cutter, motion and grid in words.
     subject: String,
+    /// What brute force does of it, if it is asked for.
+    thinned: String,
     /// Rows that any extent needs, the papers' n.
     rows: u64,
     /// Cores that this process may use.
@@ -70,14 +74,16 @@ fn measure_and_write(args: &BenchScaling, display: &Display) -> Result<String> {
     let bodies = runs.first().map(|r| r.record.bodies.as_slice());
     let bodies = bodies.unwrap_or_default();
     let points: u64 = bodies.iter().map(|b| b.points).sum();
+    let typed: Vec<String> = std::env::args().skip(1).collect();
     let experiment = Experiment {
+        command: format!("horma {}", typed.join(" ")),
         subject: format!(
-            "{name}, {points} points, {}, step {} mm, {} points a revolution{}",
+            "{name}, {points} points, {}, step {} mm, {} points a revolution",
             super::figures::described(&file.job.cutter),
             file.job.motion.step,
             file.job.motion.points_per_revolution,
-            thinned(args, &file.job),
         ),
+        thinned: thinned(args, &file.job),
         rows: runs
             .iter()
             .filter_map(|r| r.record.traffic)
@@ -151,15 +157,20 @@ fn write(args: &BenchScaling, experiment: &Experiment) -> Result<String> {
     let summaries = summary::all(&experiment.runs);
     let fitted = model::fit(experiment.rows, &summaries);
     let projections = model::project(&summaries, &fitted, experiment.network);
-    let tables = tables::markdown(experiment, &summaries, &fitted, &projections);
+    let diagrams = diagrams::all(experiment, &summaries, &fitted, &projections);
+    let shown: Vec<(&str, &str)> = diagrams
+        .iter()
+        .map(|(name, plot)| (name.as_str(), plot.title.as_str()))
+        .collect();
+    let tables = tables::markdown(experiment, &summaries, &fitted, &projections, &shown);
     let staging = Staging::begin_of(&args.output, &output::SCALING_FILES)?;
     let write = |name: &str, text: &str| {
         output::write(&staging.file(name), |out| out.write_all(text.as_bytes()))
     };
     write(output::SCALING_TABLE, &tables)?;
     write(output::SCALING_FIGURES, &tables::csv(&experiment.runs))?;
-    for (name, diagram) in diagrams::all(experiment, &summaries, &fitted, &projections) {
-        write(&name, &plot::svg(&diagram))?;
+    for (name, diagram) in &diagrams {
+        write(name, &plot::svg(diagram))?;
     }
     staging.publish()?;
     Ok(tables)

@@ -10,12 +10,13 @@ use super::model::{Fit, Projection};
 use super::runs::Run;
 use super::summary::{self, PHASES, Summary};
 
-/// All tables.
+/// All tables, and the diagrams by file and title.
 pub(super) fn markdown(
     experiment: &Experiment,
     summaries: &[Summary],
     fits: &[Fit],
     projections: &[Projection],
+    diagrams: &[(&str, &str)],
 ) -> String {
     let network = experiment.network;
     let sections = [
@@ -25,7 +26,9 @@ pub(super) fn markdown(
             "Wall time from the start of the processes to the path, s: median, and range. CPU in s. The \
              critical path is the CPU time of the master and of the busiest worker. Speed-up and \
              efficiency are against one process, by wall time and by critical path. Imbalance: how \
-             much more CPU time than the average the busiest worker took.",
+             much more CPU time than the average the busiest worker took. By brute force a position looks at \
+             all rows that its extent has, and at fewer the more extents there are: so it gains more \
+             than the number of workers.",
             &times(summaries),
         ),
         section(
@@ -56,6 +59,7 @@ pub(super) fn markdown(
             ),
             &projected(projections),
         ),
+        pictures(diagrams),
     ];
     sections.join("\n\n") + "\n"
 }
@@ -73,11 +77,18 @@ fn heading(experiment: &Experiment, summaries: &[Summary]) -> String {
         String::new()
     };
     format!(
-        "# Scaling\n\nhorma {VERSION}: {}. {cores} cores; load in the minute before: {:.1}. Rounds: \
+        "# Scaling\n\n```sh\n{}\n```\n\nhorma {VERSION}: {}{}. {cores} cores; load in the minute before: {:.1}. Rounds: \
          {rounds}, in each of which every case took its turn, a thread to each worker, and gave the path \
          of one process to the last bit.{few}",
-        experiment.subject, experiment.load
+        experiment.command, experiment.subject, experiment.thinned, experiment.load
     )
+}
+
+fn pictures(diagrams: &[(&str, &str)]) -> String {
+    let lines = diagrams
+        .iter()
+        .map(|(file, title)| format!("![{title}]({file})"));
+    format!("## Diagrams\n\n{}", lines.collect::<Vec<_>>().join("\n\n"))
 }
 
 fn section(title: &str, note: &str, table: &[Vec<String>]) -> String {
