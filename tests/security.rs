@@ -2,6 +2,8 @@
 //! right role is turned away and told why.
 
 mod common;
+#[path = "security/look.rs"]
+mod look;
 
 use std::path::{Path, PathBuf};
 

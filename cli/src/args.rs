@@ -576,6 +576,11 @@ pub(crate) struct Master {
         default_value = "127.0.0.1:7171"
     )]
     pub bind: String,
+    /// Where to serve metrics, health and a status page over HTTP, for whoever may look: a
+    /// port of this machine, or HOST:PORT; port 0 takes any free one. Beyond this machine the rule of
+    /// --bind holds: certificates, or --insecure [default: nowhere]
+    #[arg(long, value_name = "[HOST:]PORT", env = "HORMA_HTTP")]
+    pub http: Option<String>,
     /// Address that the rendezvous file tells; without a port, the port that is bound [default: the
     /// bound address, or this host's name if that is every interface]
     #[arg(long, value_name = "HOST[:PORT]", env = "HORMA_ADVERTISE")]
@@ -666,6 +671,11 @@ pub(crate) struct Worker {
     /// one that leads to the master]
     #[arg(long, value_name = "HOST[:PORT]", env = "HORMA_ADVERTISE")]
     pub advertise: Option<String>,
+    /// Where to serve metrics and health over HTTP, for whoever may look: a
+    /// port of this machine, or HOST:PORT; port 0 takes any free one. Beyond this machine the rule of
+    /// --bind holds: certificates, or --insecure [default: nowhere]
+    #[arg(long, value_name = "[HOST:]PORT", env = "HORMA_HTTP")]
+    pub http: Option<String>,
     /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated
     #[arg(long, conflicts_with = "tls_ca")]
     pub insecure: bool,

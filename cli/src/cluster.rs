@@ -1,6 +1,7 @@
 //! A run on worker processes of this host: a master in this process, and workers started from this
 //! very binary, each on a port of the system's choice. They join as remote ones would.
 
+use std::net::SocketAddr;
 use std::process::Stdio;
 use std::time::Duration;
 
@@ -50,11 +51,7 @@ pub(crate) struct Local {
 
 /// Starts a master, and `workers` processes of `threads` threads each that register with it.
 pub(crate) async fn start(workers: u32, threads: usize, simd: Simd) -> Result<Local> {
-    let listener = bind("127.0.0.1:0").await?;
-    let address = listener.local_addr().map_err(|source| Error::Bind {
-        address: "127.0.0.1:0".to_owned(),
-        source,
-    })?;
+    let (listener, address) = bind("127.0.0.1:0", false).await?;
     let config = Config {
         connections: 1000,
         heartbeat: Duration::from_millis(500),
@@ -69,7 +66,7 @@ pub(crate) async fn start(workers: u32, threads: usize, simd: Simd) -> Result<Lo
     };
     let shutdown = CancellationToken::new();
     let stopped = shutdown.clone().drop_guard();
-    let (master, _serving) = horma_master::start(listener, config, shutdown)?;
+    let (master, _, _serving) = horma_master::start(listener, config, shutdown)?;
     // Each child belongs to a task that waits for its end; dropping the set kills them all.
     let mut children = JoinSet::new();
     let mut numbers = Vec::new();
@@ -122,6 +119,7 @@ fn spawn(id: &str, master: &str, threads: usize, simd: Simd) -> Result<Child> {
         .args(["--threads", &threads.to_string()])
         .args(["--simd", &simd.to_string()])
         .env_remove("HORMA_ADVERTISE")
+        .env_remove("HORMA_HTTP")
         .env_remove("HORMA_RENDEZVOUS")
         .env_remove("HORMA_TLS_CA")
         .env_remove("HORMA_TLS_CERT")
@@ -135,12 +133,18 @@ fn spawn(id: &str, master: &str, threads: usize, simd: Simd) -> Result<Child> {
     command.spawn().map_err(|e| failed(program, e))
 }
 
-/// Listens on an address.
-pub(crate) async fn bind(address: &str) -> Result<TcpListener> {
-    TcpListener::bind(address)
-        .await
-        .map_err(|source| Error::Bind {
-            address: address.to_owned(),
-            source,
-        })
+/// Listens on an address; beyond this machine only if what comes from there can be trusted.
+pub(crate) async fn bind(address: &str, trusted: bool) -> Result<(TcpListener, SocketAddr)> {
+    let failed = |source| Error::Bind {
+        address: address.to_owned(),
+        source,
+    };
+    let listener = TcpListener::bind(address).await.map_err(failed)?;
+    let bound = listener.local_addr().map_err(failed)?;
+    if !bound.ip().is_loopback() && !trusted {
+        return Err(Error::Exposed {
+            address: bound.to_string(),
+        });
+    }
+    Ok((listener, bound))
 }

@@ -15,8 +15,9 @@ use horma_worker::reachable;
 use tokio::net::TcpListener;
 
 use crate::args::Doctor;
+use crate::cluster::bind;
 use crate::error::{Error, Result};
-use crate::serve::{bind_as, rendezvous, runtime};
+use crate::serve::{rendezvous, runtime};
 use crate::{reach, say, system, tls};
 
 /// Longest time for the master's answer; it dials back meanwhile.
@@ -95,7 +96,7 @@ async fn examine(args: &Doctor) -> Vec<Check> {
     };
     checks.push(certificate(tls.as_ref()));
     let trusted = tls.is_some() || args.insecure;
-    let (listener, bound) = match bind_as(&args.bind, trusted).await {
+    let (listener, bound) = match bind(&args.bind, trusted).await {
         Ok(listening) => listening,
         Err(error) => {
             checks.push(Check::new(Found::Wrong, "bind", error.to_string()));

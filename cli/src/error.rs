@@ -92,6 +92,8 @@ pub(crate) enum Error {
         "without its fallback, or without delta_u and delta_v, the local search goes over the whole path in one process; use `horma run` without workers"
     )]
     OneProcess,
+    #[error("cannot count what goes on: {0}")]
+    Metrics(String),
     #[error("{failed} of {checks} checks failed")]
     Unfit {
         failed: usize,
@@ -147,6 +149,7 @@ impl Error {
             | Self::JobFailed { .. }
             | Self::BadReply { .. }
             | Self::Certs(_)
+            | Self::Metrics(_)
             | Self::Unfit { here: false, .. }
             | Self::Threads(_) => 4,
             Self::Interrupted => 130,

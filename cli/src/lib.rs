@@ -18,6 +18,7 @@ mod verify;
 mod bench;
 mod certs;
 mod doctor;
+mod http;
 mod inspect;
 mod reach;
 mod serve;

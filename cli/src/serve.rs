@@ -10,11 +10,13 @@ use horma_proto::Role;
 use horma_worker::Rendezvous;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
+use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
 use crate::args::{Master, Worker};
 use crate::cluster::bind;
 use crate::error::{Error, Result};
+use crate::http::{self, Watched};
 use crate::{reach, say, system, tls};
 
 /// How long threads may take to notice that the process ends.
@@ -53,8 +55,14 @@ pub(crate) fn master(args: &Master) -> Result<()> {
         let _published = rendezvous
             .map(|f| reach::publish(f, &address))
             .transpose()?;
+        let http = http::listen(args.http.as_deref(), Role::Master, trusted).await?;
+        let tls = config.tls.clone();
         let shutdown = CancellationToken::new();
-        let (master, serving) = horma_master::start(listener, config, shutdown.clone())?;
+        let (master, window, serving) = horma_master::start(listener, config, shutdown.clone())?;
+        if let Some(http) = http {
+            let (watched, shutdown) = (Watched::Master(Box::new(window)), shutdown.clone());
+            tokio::spawn(async move { http::serve(http, tls.as_ref(), watched, shutdown).await });
+        }
         let mut serving = std::pin::pin!(serving);
         tokio::select! {
             served = &mut serving => return served.map_or(Ok(()), |s| Ok(s?)),
@@ -75,6 +83,7 @@ pub(crate) fn worker(args: Worker) -> Result<()> {
     let trusted = tls.is_some() || args.insecure;
     serve(async {
         let (listener, bound) = listen(&args.bind, trusted).await?;
+        let http = http::listen(args.http.as_deref(), Role::Worker, trusted).await?;
         let config = horma_worker::Config {
             master: rendezvous(args.rendezvous, args.master),
             id: args.id.unwrap_or_else(|| reach::worker_name(variable)),
@@ -85,8 +94,15 @@ pub(crate) fn worker(args: Worker) -> Result<()> {
             simd: args.simd.unwrap_or_else(Simd::best),
             patience: Duration::from_secs(args.patience),
         };
+        let tls = config.tls.clone();
         let leave = CancellationToken::new();
-        let mut running = std::pin::pin!(horma_worker::run(listener, config, leave.clone()));
+        let (registered, watched) = watch::channel(false);
+        if let Some(http) = http {
+            let (watched, leave) = (Watched::Worker(watched), leave.clone());
+            tokio::spawn(async move { http::serve(http, tls.as_ref(), watched, leave).await });
+        }
+        let running = horma_worker::run(listener, config, registered, leave.clone());
+        let mut running = std::pin::pin!(running);
         tokio::select! {
             ran = &mut running => return Ok(ran?),
             () = system::interrupted() => leave.cancel(),
@@ -125,23 +141,8 @@ fn serve(server: impl Future<Output = Result<()>>) -> Result<()> {
 
 /// Listens, and prints where: with port 0 nobody could know otherwise.
 async fn listen(address: &str, trusted: bool) -> Result<(TcpListener, SocketAddr)> {
-    let (listener, bound) = bind_as(address, trusted).await?;
+    let (listener, bound) = bind(address, trusted).await?;
     say(&format!("listening on {bound}"));
-    Ok((listener, bound))
-}
-
-/// Listens; beyond this machine only if what comes from there can be trusted.
-pub(crate) async fn bind_as(address: &str, trusted: bool) -> Result<(TcpListener, SocketAddr)> {
-    let listener = bind(address).await?;
-    let bound = listener.local_addr().map_err(|source| Error::Bind {
-        address: address.to_owned(),
-        source,
-    })?;
-    if !bound.ip().is_loopback() && !trusted {
-        return Err(Error::Exposed {
-            address: bound.to_string(),
-        });
-    }
     Ok((listener, bound))
 }
 

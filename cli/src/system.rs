@@ -1,6 +1,6 @@
 //! What the machine has: memory, cores, threads on them, a name; and the user's wish to stop.
 
-use sysinfo::{MemoryRefreshKind, RefreshKind, System};
+use sysinfo::{MemoryRefreshKind, ProcessRefreshKind, ProcessesToUpdate, RefreshKind, System};
 
 use crate::error::{Error, Result};
 
@@ -13,6 +13,16 @@ pub(crate) fn memory() -> u64 {
     };
     let limit = system.cgroup_limits().map_or(u64::MAX, |l| l.free_memory);
     system.available_memory().min(limit)
+}
+
+/// Memory that this process holds, bytes; 0 on a system that does not tell.
+pub(crate) fn memory_held() -> u64 {
+    let (Ok(mut system), Ok(me)) = (System::new(), sysinfo::get_current_pid()) else {
+        return 0;
+    };
+    let memory = ProcessRefreshKind::nothing().with_memory();
+    system.refresh_processes_specifics(ProcessesToUpdate::Some(&[me]), false, memory);
+    system.process(me).map_or(0, sysinfo::Process::memory)
 }
 
 /// Cores of this machine that this process may use.

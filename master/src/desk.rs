@@ -13,6 +13,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use bytes::Bytes;
 use horma_core::Handout;
 use horma_proto::Error as Refusal;
+use horma_proto::metrics::JOBS_ENDED;
 use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
 use tokio::task::spawn_blocking;
 use tokio_util::sync::CancellationToken;
@@ -207,6 +208,17 @@ impl Desk {
             .collect()
     }
 
+    /// Jobs that are not over, in their order.
+    pub fn open_jobs(&self) -> Vec<(u64, Entry)> {
+        let jobs = self.lock();
+        let entry = |(&job, known): (&u64, &Known)| {
+            let view = known.view.borrow();
+            let open = view.entry.stage.is_open();
+            open.then(|| (job, view.entry.clone()))
+        };
+        jobs.iter().filter_map(entry).collect()
+    }
+
     /// A job as it goes on.
     pub fn watch(&self, job: u64) -> Answer<watch::Receiver<View>> {
         let jobs = self.lock();
@@ -265,6 +277,7 @@ impl Desk {
             let changed = !over && view.entry.stage != stage;
             if changed {
                 info!(job, ?stage, "job");
+                count(&stage);
                 view.entry.stage = stage;
             }
             changed
@@ -460,6 +473,16 @@ fn failed(error: Error) -> Stage {
 fn now() -> Duration {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.unwrap_or_default()
+}
+
+/// Tells those who watch that a job is over, and how it ended.
+fn count(stage: &Stage) {
+    match stage {
+        Stage::Queued | Stage::Running { .. } | Stage::Gone { .. } => {}
+        Stage::Done { .. } => JOBS_ENDED.add("done", 1),
+        Stage::Failed { .. } => JOBS_ENDED.add("failed", 1),
+        Stage::Cancelled { .. } => JOBS_ENDED.add("cancelled", 1),
+    }
 }
 
 fn unknown(job: u64) -> Refusal {

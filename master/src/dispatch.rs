@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use horma_core::{Counters, Extent, ExtentRecord, Handout, Run, Stock};
+use horma_proto::metrics::{POSITIONS, TRAFFIC};
 use horma_proto::transport::{self, Trouble};
 use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::digitize_request::Kind as Request;
@@ -170,7 +171,9 @@ fn requests(
     let requests = std::iter::once(Request::Task(task)).chain(chunks.map(Request::Rows));
     tokio_stream::iter(requests.map(move |kind| {
         let request = DigitizeRequest { kind: Some(kind) };
-        sent.fetch_add(request.encoded_len() as u64, Ordering::Relaxed);
+        let bytes = request.encoded_len() as u64;
+        sent.fetch_add(bytes, Ordering::Relaxed);
+        TRAFFIC.add("to_workers", bytes);
         request
     }))
 }
@@ -243,6 +246,7 @@ async fn receive(
     while let Some(reply) = replies.message().await.map_err(|s| fault(&s))? {
         let bytes = reply.encoded_len() as u64;
         attempt.coming.bytes.fetch_add(bytes, Ordering::Relaxed);
+        TRAFFIC.add("results", bytes);
         let id: TaskId = reply.id.try_into().map_err(wrong)?;
         if id != attempt.task {
             return Err(Fault::Wrong(format!("it speaks of {id}")));
@@ -308,6 +312,7 @@ fn take(
         let why = "it inserted positions that nobody asked for";
         return Err(Fault::Wrong(why.to_owned()));
     }
+    POSITIONS.add("", count);
     sent.note(run.first..run.end()).map_err(Fault::Wrong)?;
     attempt.came.store(sent.so_far(), Ordering::Relaxed);
     let (first, worker) = (run.first, &attempt.worker);

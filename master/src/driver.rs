@@ -16,9 +16,11 @@ use tracing::{info, warn};
 
 use crate::dispatch::{Undelivered, dispatch};
 use crate::error::Error;
+use crate::history::{Happening, History};
 use crate::journal::Resumed;
 use crate::place::{Placed, place};
 use crate::running::{Reply, RunningJob};
+use crate::snapshot::{self, JobState, Snapshot, snapshot};
 use crate::state::{Command, Event, Fault, Held, State, Step, apply};
 use crate::{Config, Progress};
 
@@ -48,6 +50,11 @@ pub(crate) enum Message {
         incarnation: u64,
         /// What is going on, if it is known.
         reply: oneshot::Sender<Option<Going>>,
+    },
+    /// Somebody wants to see what goes on, and what has happened since.
+    Look {
+        since: u64,
+        reply: oneshot::Sender<(Snapshot, Vec<Happening>)>,
     },
     /// A worker is about to stop.
     Leave {
@@ -98,6 +105,7 @@ pub(crate) fn start(
         drained: None,
         inbox: inbox.downgrade(),
         count,
+        history: History::default(),
     };
     tokio::spawn(driver.run(messages, shutdown));
     (inbox, workers, incarnation)
@@ -121,6 +129,7 @@ struct Driver {
     drained: Option<oneshot::Sender<()>>,
     inbox: mpsc::WeakSender<Message>,
     count: watch::Sender<usize>,
+    history: History,
 }
 
 impl Driver {
@@ -170,7 +179,7 @@ impl Driver {
         for job in self.jobs.iter().filter_map(gone).collect::<Vec<_>>() {
             info!(job, "cancelled");
             self.apply(Event::Cancelled { job }, None);
-            self.jobs.remove(&job);
+            self.end(job, JobState::Cancelled, None);
         }
     }
 
@@ -211,6 +220,13 @@ impl Driver {
                     next_job: self.next_job,
                 });
                 let _ = reply.send(going);
+            }
+            Message::Look { since, reply } => {
+                let now = self.begin.elapsed();
+                let seen = snapshot(&self.state, &self.jobs, &self.addresses, &self.history, now);
+                let happened = self.history.since(since).cloned().collect();
+                // Whoever wanted to see it may have gone.
+                let _ = reply.send((seen, happened));
             }
             Message::Leave {
                 worker,
@@ -343,7 +359,10 @@ impl Driver {
     }
 
     fn apply(&mut self, event: Event, mut record: Option<ExtentRecord>) {
-        for command in apply(&mut self.state, self.begin.elapsed(), event) {
+        self.history.happened(&event);
+        let commands = apply(&mut self.state, self.begin.elapsed(), event);
+        self.history.decided(&commands);
+        for command in commands {
             match command {
                 Command::Place { worker, task } => self.place(worker, task),
                 Command::Start {
@@ -367,7 +386,7 @@ impl Driver {
                     }
                 }
                 Command::Complete { job } => {
-                    if let Some(job) = self.jobs.remove(&job) {
+                    if let Some(job) = self.end(job, JobState::Done, None) {
                         job.complete();
                     }
                 }
@@ -379,9 +398,17 @@ impl Driver {
     /// Tells whoever waits for a job that it came to nothing.
     fn fail(&mut self, job: u64, error: Error) {
         warn!(job, %error, "failed");
-        if let Some(job) = self.jobs.remove(&job) {
+        if let Some(job) = self.end(job, JobState::Failed, Some(error.to_string())) {
             let _ = job.reply.send(Err(error));
         }
+    }
+
+    /// Takes a job out that is over, and remembers what became of it.
+    fn end(&mut self, job: u64, state: JobState, reason: Option<String>) -> Option<RunningJob> {
+        let running = self.jobs.remove(&job)?;
+        self.history
+            .end(snapshot::ended(job, &running, state, reason));
+        Some(running)
     }
 
     /// Brings an extent's own rows to a worker, in the background.

@@ -22,6 +22,11 @@ mod driver;
 mod running;
 mod state;
 
+mod history;
+mod page;
+pub mod snapshot;
+mod window;
+
 mod dispatch;
 mod place;
 mod received;
@@ -41,7 +46,10 @@ use desk::Desk;
 use store::Store;
 
 pub use error::{Error, Result};
+pub use history::Happening;
+pub use page::page;
 pub use run::Master;
+pub use window::Window;
 
 /// What a master has to know.
 #[derive(Debug, Clone)]
@@ -102,7 +110,7 @@ pub type Progress = Arc<dyn Fn(&'static str, u64, u64) + Send + Sync>;
 const DRAIN: Duration = Duration::from_secs(5);
 
 /// Starts a master on `listener`. It serves workers and clients until `shutdown`; the handle runs
-/// jobs from within this process.
+/// jobs from within this process, and through the window others look.
 ///
 /// # Errors
 /// Those of opening the store.
@@ -110,7 +118,7 @@ pub fn start(
     listener: TcpListener,
     config: Config,
     shutdown: CancellationToken,
-) -> Result<(Master, JoinHandle<Result<()>>)> {
+) -> Result<(Master, Window, JoinHandle<Result<()>>)> {
     let connections = config.connections;
     let (tls, clients, heartbeat) = (config.tls.clone(), config.clients.clone(), config.heartbeat);
     let store = clients
@@ -126,6 +134,10 @@ pub fn start(
         }
         _ => None,
     };
+    let window = Window {
+        master: master.clone(),
+        desk: desk.clone(),
+    };
     let service = service::Service {
         guard: Guard::of(tls.as_ref()),
         tls: tls.clone(),
@@ -138,12 +150,14 @@ pub fn start(
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
     let failed = |e| Error::Serve(Arc::new(e));
+    let stopping = master.draining.clone().cancelled_owned();
     let serving = tokio::spawn(async move {
         let server = transport::serve(
             service,
             listener,
             connections,
             tls.as_ref(),
+            stopping,
             shutdown.cancelled(),
         );
         let mut server = std::pin::pin!(server);
@@ -157,5 +171,5 @@ pub fn start(
             Err(_) => Ok(()),
         }
     });
-    Ok((master, serving))
+    Ok((master, window, serving))
 }

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use horma_core::Handout;
+use horma_proto::metrics::TRAFFIC;
 use horma_proto::wire::place_request::Kind as Request;
 use horma_proto::wire::{self, PlaceRequest};
 use horma_proto::{Chunks, TaskId, Tls};
@@ -94,7 +95,9 @@ fn requests(
     let requests = std::iter::once(Request::Placement(placement)).chain(chunks);
     tokio_stream::iter(requests.map(move |kind| {
         let request = PlaceRequest { kind: Some(kind) };
-        sent.fetch_add(request.encoded_len() as u64, Ordering::Relaxed);
+        let bytes = request.encoded_len() as u64;
+        sent.fetch_add(bytes, Ordering::Relaxed);
+        TRAFFIC.add("to_workers", bytes);
         request
     }))
 }

@@ -4,13 +4,16 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use horma_core::{Handout, Job, Part, Phase, Record, Sharing, SubTrajectory, stitch};
+use horma_proto::metrics::JOB_SECONDS;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::spawn_blocking;
 use tokio_util::sync::CancellationToken;
 
 use crate::driver::{self, Message};
 use crate::error::{Error, Result};
+use crate::history::Happening;
 use crate::journal::Resumed;
+use crate::snapshot::Snapshot;
 use crate::{Config, Outcome, Progress};
 
 /// A handle to a running master.
@@ -158,6 +161,16 @@ impl Master {
         })
     }
 
+    /// What goes on, and what has happened since the event of that number.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if the master has stopped.
+    pub async fn look(&self, since: u64) -> Result<(Snapshot, Vec<Happening>)> {
+        let (reply, seen) = oneshot::channel();
+        self.tell(Message::Look { since, reply }).await?;
+        seen.await.map_err(|_| Error::Interrupted)
+    }
+
     pub(crate) async fn tell(&self, message: Message) -> Result<()> {
         self.inbox
             .send(message)
@@ -177,6 +190,9 @@ impl Running {
         let plan = self.planned.plan;
         let path = stitch(plan.trajectory, parts).map_err(Error::Stitch)?;
         let stitched = begin.elapsed();
+        JOB_SECONDS.record("discretize", self.planned.took.as_secs_f64());
+        JOB_SECONDS.record("digitize", digitized.as_secs_f64());
+        JOB_SECONDS.record("stitch", stitched.as_secs_f64());
         record.phases = [
             ("discretize", self.planned.took),
             ("digitize", digitized),

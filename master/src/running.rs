@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
 
 use horma_core::{
     Counters, Distribution, Extent, ExtentRecord, Handout, LostAttempt, Record, SecondAttempt,
@@ -22,6 +23,9 @@ use crate::state::{Fault, Held};
 pub(crate) type Reply = oneshot::Sender<Result<(Vec<SubTrajectory>, Record)>>;
 
 pub(crate) struct RunningJob {
+    pub begin: Instant,
+    /// Positions that were in the journal already.
+    pub resumed: u64,
     pub plan: Arc<Handout>,
     pub extents: Vec<Extent>,
     /// What has come of each.
@@ -43,7 +47,7 @@ pub(crate) struct RunningJob {
     from_journal: u32,
     /// What placing rows has taken so far, by extent.
     pub placed: BTreeMap<u32, Placed>,
-    lost: Vec<LostAttempt>,
+    pub lost: Vec<LostAttempt>,
     second: Vec<SecondAttempt>,
     /// Calls under way.
     pub calls: BTreeMap<TaskId, Call>,
@@ -93,6 +97,8 @@ impl RunningJob {
             None => Arc::new(Coming::of(extent)),
         };
         Self {
+            begin: Instant::now(),
+            resumed: arrived as u64,
             coming: extents.iter().map(coming).collect(),
             plan,
             extents,
@@ -262,19 +268,40 @@ impl RunningJob {
         self.kept.insert(extent, kept);
     }
 
-    /// Hands over what was kept.
-    pub fn complete(self) {
-        let mut counters = Counters::default();
+    /// Positions that have arrived, and those inserted between them.
+    pub fn so_far(&self) -> [u64; 2] {
+        [&self.arrived, &self.inserted].map(|n| n.load(Ordering::Relaxed))
+    }
+
+    /// What has travelled so far. What workers got from each other is known once an extent is kept.
+    pub fn traffic(&self) -> Traffic {
         let mut traffic = Traffic {
             rows_needed: self.users.iter().filter(|&&n| n > 0).count() as u64,
             ..Traffic::default()
         };
+        for (extent, coming) in (0..).zip(&self.coming) {
+            if let Some((_, record)) = self.kept.get(&extent) {
+                traffic.rows_sent += record.rows_sent;
+                traffic.bytes_to_workers += record.bytes_sent;
+                traffic.bytes_between_workers += record.bytes_fetched;
+                traffic.bytes_of_results += record.bytes_received;
+            } else {
+                let placed = self.placed.get(&extent).copied().unwrap_or_default();
+                let with_tasks = self.rows_sent.get(&extent).copied().unwrap_or_default();
+                traffic.rows_sent += placed.rows + with_tasks;
+                traffic.bytes_to_workers += placed.bytes + coming.sent.load(Ordering::Relaxed);
+                traffic.bytes_of_results += coming.bytes.load(Ordering::Relaxed);
+            }
+        }
+        traffic
+    }
+
+    /// Hands over what was kept.
+    pub fn complete(self) {
+        let mut counters = Counters::default();
+        let traffic = self.traffic();
         let (mut parts, mut extents) = (Vec::new(), Vec::new());
         for (positions, record) in self.kept.into_values() {
-            traffic.rows_sent += record.rows_sent;
-            traffic.bytes_to_workers += record.bytes_sent;
-            traffic.bytes_between_workers += record.bytes_fetched;
-            traffic.bytes_of_results += record.bytes_received;
             counters += record.counters;
             parts.extend(Arc::unwrap_or_clone(positions));
             extents.push(record);

@@ -15,6 +15,7 @@ mod assign;
 mod help;
 mod lose;
 mod pace;
+mod view;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -25,6 +26,8 @@ use self::assign::assign;
 use self::help::help;
 use self::lose::{gone, leave, lose};
 use self::pace::Pace;
+pub use self::view::ExtentState;
+pub(crate) use self::view::Member;
 use crate::error::Error;
 
 /// Failures of one extent after which it is the extent, not the workers, if all of them had a try.

@@ -3,7 +3,6 @@
 
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -94,7 +93,7 @@ async fn handshake(
     if let Ok(Ok(stream)) = outcome {
         return Some(stream);
     }
-    refused.connections.fetch_add(1, Ordering::Relaxed);
+    refused.connection();
     if let Ok(Err((reason, socket))) = outcome {
         warn!(%peer, %reason, "connection refused");
         // Closing with something unread would be a reset, and might overtake the reason.

@@ -13,6 +13,7 @@ mod task;
 
 mod accept;
 mod limit;
+pub mod metrics;
 mod refused;
 pub mod tls;
 pub mod transport;
@@ -22,6 +23,7 @@ pub mod transport;
 #[allow(clippy::needless_pass_by_value, clippy::semicolon_if_nothing_returned)]
 pub mod wire {
     tonic::include_proto!("horma.cluster.v1");
+    pub(crate) const DESCRIPTORS: &[u8] = tonic::include_file_descriptor_set!("descriptors");
 }
 
 pub use chunk::{CHUNK_BYTES, Chunks, Messages};

@@ -7,21 +7,23 @@ use tonic::codegen::http::Response;
 use tonic::{Code, Status};
 use tracing::info;
 
+use crate::metrics::REFUSED;
+
 /// Counters since the server started.
 #[derive(Debug, Default)]
 pub(crate) struct Refused {
     /// Connections whose other end did not prove who it is.
-    pub connections: AtomicU64,
+    connections: AtomicU64,
     /// Calls by somebody of another role.
-    pub forbidden: AtomicU64,
+    forbidden: AtomicU64,
     /// Calls whose messages are no messages, or come in no order.
-    pub malformed: AtomicU64,
+    malformed: AtomicU64,
     /// Calls with more than is accepted.
-    pub oversized: AtomicU64,
+    oversized: AtomicU64,
     /// Calls that did not arrive as they were sent.
-    pub damaged: AtomicU64,
+    damaged: AtomicU64,
     /// Calls that failed for any other reason.
-    pub other: AtomicU64,
+    other: AtomicU64,
 }
 
 impl Refused {
@@ -29,15 +31,22 @@ impl Refused {
     pub fn count<B>(&self, response: &Response<B>) {
         // A status among the headers means that nothing was answered but this.
         let status = Status::from_header_map(response.headers());
-        let counter = match status.map(|s| s.code()) {
+        let (counter, reason) = match status.map(|s| s.code()) {
             None | Some(Code::Ok) => return,
-            Some(Code::PermissionDenied | Code::Unauthenticated) => &self.forbidden,
-            Some(Code::InvalidArgument) => &self.malformed,
-            Some(Code::OutOfRange) => &self.oversized,
-            Some(Code::DataLoss) => &self.damaged,
-            Some(_) => &self.other,
+            Some(Code::PermissionDenied | Code::Unauthenticated) => (&self.forbidden, "forbidden"),
+            Some(Code::InvalidArgument) => (&self.malformed, "malformed"),
+            Some(Code::OutOfRange) => (&self.oversized, "oversized"),
+            Some(Code::DataLoss) => (&self.damaged, "damaged"),
+            Some(_) => (&self.other, "other"),
         };
         counter.fetch_add(1, Ordering::Relaxed);
+        REFUSED.add(reason, 1);
+    }
+
+    /// Counts a connection whose other end did not prove who it is.
+    pub fn connection(&self) {
+        self.connections.fetch_add(1, Ordering::Relaxed);
+        REFUSED.add("connection", 1);
     }
 
     /// Tells the log.

@@ -159,6 +159,13 @@ impl Tls {
         })
     }
 
+    /// Takes in connections of another protocol than gRPC's.
+    pub(crate) fn acceptor_of(&self, protocol: &[u8]) -> TlsAcceptor {
+        let mut server = ServerConfig::clone(self.acceptor.config());
+        server.alpn_protocols = vec![protocol.to_vec()];
+        TlsAcceptor::from(Arc::new(server))
+    }
+
     /// What the certificate entitles to.
     pub fn roles(&self) -> &[Role] {
         &self.roles

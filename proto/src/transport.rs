@@ -13,16 +13,20 @@ use tokio_rustls::TlsConnector;
 use tokio_rustls::client::TlsStream;
 use tokio_rustls::rustls::pki_types::ServerName;
 use tokio_rustls::rustls::{self, AlertDescription, CertificateError};
+use tokio_rustls::server::TlsStream as Accepted;
+use tokio_stream::wrappers::ReceiverStream;
 use tonic::body::Body;
 use tonic::codegen::http::{Request, Response, Uri};
 use tonic::server::NamedService;
 use tonic::transport::server::TcpIncoming;
 use tonic::transport::{Channel, Endpoint, Server};
+use tonic_health::ServingStatus;
 use tower::Service;
 use tower::util::MapResponseLayer;
 
 use crate::refused::Refused;
 use crate::tls::{Role, Tls};
+use crate::wire::DESCRIPTORS;
 use crate::{accept, limit};
 
 /// Longest time to connect.
@@ -97,8 +101,9 @@ async fn dial(address: String, role: Role, connector: TlsConnector) -> io::Resul
 }
 
 /// Serves on `listener` until `shutdown` and the end of all open calls, at most so many connections at
-/// once: more wait until others are closed. Then the log is told what was
-/// refused.
+/// once: more wait until others are closed. Then the log is told what was refused. Beside the service it
+/// answers gRPC's own questions: after health, which ends when `stopping` does, and after what is served
+/// here. Whoever got through the handshake may ask these.
 ///
 /// # Errors
 /// The listener is gone.
@@ -107,6 +112,7 @@ pub async fn serve<S>(
     listener: TcpListener,
     connections: usize,
     tls: Option<&Tls>,
+    stopping: impl Future<Output = ()>,
     shutdown: impl Future<Output = ()>,
 ) -> Result<(), tonic::transport::Error>
 where
@@ -121,6 +127,13 @@ where
         + Sync
         + 'static,
 {
+    let (health, asked_after) = tonic_health::server::health_reporter();
+    health.set_serving::<S>().await;
+    let reflection = tonic_reflection::server::Builder::configure()
+        .register_encoded_file_descriptor_set(DESCRIPTORS)
+        .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+        .build_v1()
+        .expect("descriptors that code was generated from");
     let refused = Arc::new(Refused::default());
     let counting = refused.clone();
     let services = Server::builder()
@@ -130,23 +143,51 @@ where
             counting.count(&response);
             response
         }))
-        .add_service(service);
-    let served = match tls {
-        None => {
-            let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-            let incoming = limit::at_most(connections, incoming);
-            let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
-            serving.await
+        .add_service(service)
+        .add_service(asked_after)
+        .add_service(reflection);
+    let serving = async {
+        match tls {
+            None => {
+                let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+                let incoming = limit::at_most(connections, incoming);
+                let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
+                serving.await
+            }
+            Some(tls) => {
+                let incoming = accept::secured(listener, tls.acceptor.clone(), refused.clone());
+                let incoming = limit::at_most(connections, incoming);
+                let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
+                serving.await
+            }
         }
-        Some(tls) => {
-            let incoming = accept::secured(listener, tls.acceptor.clone(), refused.clone());
-            let incoming = limit::at_most(connections, incoming);
-            let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
-            serving.await
-        }
+    };
+    let telling = async {
+        stopping.await;
+        health.set_not_serving::<S>().await;
+        let all = ServingStatus::NotServing;
+        health.set_service_status("", all).await;
+        std::future::pending::<Infallible>().await
+    };
+    let served = tokio::select! {
+        biased;
+        never = telling => match never {},
+        served = serving => served,
     };
     refused.tell();
     served
+}
+
+/// A connection with TLS that somebody else made.
+pub type SecuredStream = Accepted<TcpStream>;
+
+/// Such connections, until this is dropped.
+pub type Secured = ReceiverStream<io::Result<SecuredStream>>;
+
+/// Connections of HTTP/1.1, from whoever proves to have a certificate, of any role.
+pub fn secured_http(listener: TcpListener, tls: &Tls) -> Secured {
+    let refused = Arc::new(Refused::default());
+    accept::secured(listener, tls.acceptor_of(b"http/1.1"), refused)
 }
 
 /// Bytes of the word by which [`answer`] is known.

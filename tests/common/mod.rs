@@ -3,7 +3,8 @@
 
 #![allow(dead_code)] // Each test binary uses its part of this.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
@@ -117,7 +118,7 @@ impl Process {
             .spawn();
         let mut child = spawned.expect("the binary starts");
         let (sender, lines) = channel();
-        let outputs: [Box<dyn std::io::Read + Send>; 2] = [
+        let outputs: [Box<dyn Read + Send>; 2] = [
             Box::new(child.stdout.take().expect("piped")),
             Box::new(child.stderr.take().expect("piped")),
         ];
@@ -243,10 +244,35 @@ pub fn master(more: &[&str]) -> (Process, String) {
     (process, address)
 }
 
+/// Where that process serves HTTP.
+pub fn http(process: &mut Process) -> String {
+    let line = process.wait_for(&["http on"]);
+    line.rsplit(' ').next().expect("a word").to_owned()
+}
+
 /// A worker of that master, once it is registered.
 pub fn worker(master: &str, id: &str) -> Process {
-    let args = ["worker", "--master", master, "--id", id, "--threads", "1"];
+    worker_with(master, id, &[])
+}
+
+/// The same, with more arguments.
+pub fn worker_with(master: &str, id: &str, more: &[&str]) -> Process {
+    let mut args = vec!["worker", "--master", master, "--id", id, "--threads", "1"];
+    args.extend(more);
     let mut process = Process::start(id, &args, "debug");
     process.wait_for(&["registered"]);
     process
+}
+
+/// The answer to a GET over plain HTTP: its status and its body.
+pub fn get(address: &str, path: &str) -> (u16, String) {
+    let mut stream = TcpStream::connect(address).expect("listening");
+    stream.set_read_timeout(Some(DEADLINE)).expect("a deadline");
+    // Of version 1.0, the end of the connection is the end of the answer.
+    write!(stream, "GET {path} HTTP/1.0\r\nHost: horma\r\n\r\n").expect("writable");
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).expect("an answer");
+    let (head, body) = answer.split_once("\r\n\r\n").expect("a head");
+    let status = head.split(' ').nth(1).and_then(|s| s.parse().ok());
+    (status.expect("a status"), body.to_owned())
 }

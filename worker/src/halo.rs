@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use horma_core::Row;
+use horma_proto::metrics::TRAFFIC;
 use horma_proto::transport::{self, Trouble};
 use horma_proto::wire::worker_client::WorkerClient;
 use horma_proto::wire::{FetchRequest, Span};
@@ -129,7 +130,9 @@ async fn ask(source: &Source, tls: Option<&Tls>) -> Result<Fetched, Status> {
     let (mut rows, mut bytes) = (Rows::default(), 0);
     let expected = horma_proto::spanned(&source.rows);
     while let Some(chunk) = timeout(SILENCE, chunks.message()).await.map_err(silent)?? {
-        bytes += chunk.data.len() as u64;
+        let length = chunk.data.len() as u64;
+        bytes += length;
+        TRAFFIC.add("between_workers", length);
         rows.push(&chunk)?;
         if rows.len() > expected {
             break;

@@ -25,6 +25,7 @@ use horma_core::Simd;
 use horma_proto::wire::worker_server::WorkerServer;
 use horma_proto::{Guard, MAX_MESSAGE, Tls, transport};
 use tokio::net::TcpListener;
+use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 use tracing::info;
 
@@ -60,12 +61,18 @@ const CONNECTIONS: usize = 1000;
 const DRAIN: Duration = Duration::from_secs(5);
 
 /// Serves on `listener` until it is told to leave, or until the master has been gone for too long. What
-/// it is at when it leaves is given back: what has come of it is the master's already.
+/// it is at when it leaves is given back: what has come of it is the master's already. Whether it is a
+/// member of the master is told to `registered` as it changes.
 ///
 /// # Errors
 /// [`Error::NoMaster`] if the master never answered, [`Error::Refused`] if it did not want this
 /// worker, and errors of the operating system.
-pub async fn run(listener: TcpListener, config: Config, leave: CancellationToken) -> Result<()> {
+pub async fn run(
+    listener: TcpListener,
+    config: Config,
+    registered: watch::Sender<bool>,
+    leave: CancellationToken,
+) -> Result<()> {
     let shutdown = CancellationToken::new();
     let bound = listener.local_addr().map_err(Error::Listener)?;
     info!(worker = config.id, %bound, "listening");
@@ -86,10 +93,19 @@ pub async fn run(listener: TcpListener, config: Config, leave: CancellationToken
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
     let (tls, stopped) = (config.tls.clone(), shutdown.clone().cancelled_owned());
+    let stopping = leave.clone().cancelled_owned();
     let serving = tokio::spawn(async move {
-        transport::serve(service, listener, CONNECTIONS, tls.as_ref(), stopped).await
+        transport::serve(
+            service,
+            listener,
+            CONNECTIONS,
+            tls.as_ref(),
+            stopping,
+            stopped,
+        )
+        .await
     });
-    let outcome = membership::keep(&config, bound, &store, &leave).await;
+    let outcome = membership::keep(&config, bound, &store, &registered, &leave).await;
     // Membership is what a worker lives for: without it there is nobody to serve.
     shutdown.cancel();
     // A task that does not notice is abandoned: the master gives its extent to another.

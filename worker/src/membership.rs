@@ -3,10 +3,12 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use horma_proto::metrics::REGISTERED;
 use horma_proto::transport::{self, Trouble, WANTS_TLS};
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::{HeartbeatRequest, LeaveRequest, RegisterRequest};
 use horma_proto::{Answer, Role, VERSION};
+use tokio::sync::watch;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
@@ -32,6 +34,7 @@ pub(crate) async fn keep(
     config: &Config,
     bound: SocketAddr,
     store: &Store,
+    registered: &watch::Sender<bool>,
     leaving: &CancellationToken,
 ) -> Result<()> {
     let member = async {
@@ -48,11 +51,13 @@ pub(crate) async fn keep(
                     let address = address.unwrap_or_else(|| reachable(bound, &master).to_string());
                     let silence = match register(&mut client, config, &address).await {
                         Ok((interval, incarnation)) => {
-                            info!(master, address, "registered");
                             store.keep_master(incarnation);
+                            member(registered, true);
+                            info!(master, address, "registered");
                             pause = FIRST_PAUSE;
                             let silence =
                                 heartbeats(&mut client, config, store, interval, &mut going).await;
+                            member(registered, false);
                             heard = Some(Instant::now());
                             silence
                         }
@@ -93,6 +98,12 @@ pub(crate) async fn keep(
             Ok(())
         }
     }
+}
+
+/// Tells those who watch whether this worker is a member.
+fn member(registered: &watch::Sender<bool>, is: bool) {
+    registered.send_replace(is);
+    REGISTERED.set("", f64::from(u8::from(is)));
 }
 
 /// Tells the master that this worker is about to stop, so that what it has goes to others at once.

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use horma_core::Row;
 use horma_proto::TaskId;
+use horma_proto::metrics::ROWS_HELD;
 use tracing::debug;
 
 /// What is held, by job and extent.
@@ -35,6 +36,7 @@ impl Store {
             rows: Arc::new(rows),
         };
         held.insert((id.job, id.extent), new);
+        count(&held);
     }
 
     /// The rows that were placed by this very attempt, in order of their ids.
@@ -47,24 +49,34 @@ impl Store {
 
     /// Drops what another start of a master placed.
     pub fn keep_master(&self, master: u64) {
-        self.lock().retain(|_, held| held.master == master);
+        let mut held = self.lock();
+        held.retain(|_, held| held.master == master);
+        count(&held);
     }
 
     /// Drops the rows of jobs below `next_job` that are not going on.
     pub fn keep_jobs(&self, jobs: &[u64], next_job: u64) {
-        self.lock().retain(|(job, extent), _| {
+        let mut held = self.lock();
+        held.retain(|(job, extent), _| {
             let keep = *job >= next_job || jobs.contains(job);
             if !keep {
                 debug!(job, extent, "rows dropped");
             }
             keep
         });
+        count(&held);
     }
 
     fn lock(&self) -> MutexGuard<'_, BTreeMap<(u64, u32), Held>> {
         // Every change is a single call: there is no half of one to be seen.
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Tells those who watch how many rows there are.
+fn count(held: &BTreeMap<(u64, u32), Held>) {
+    let rows = held.values().map(|held| held.rows.len()).sum::<usize>();
+    ROWS_HELD.set("", rows as f64);
 }
 
 #[cfg(test)]

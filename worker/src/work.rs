@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use horma_core::{Digitizer, Row, Simd};
+use horma_proto::metrics::{DIGITIZED, EVALUATIONS, NODES, TASK_SECONDS, TASKS};
 use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::{self, DigitizeReply, HaloLost, Run, Span};
 use horma_proto::{Error, TaskId, Tls};
@@ -49,14 +50,19 @@ impl<E: Into<Status>> From<E> for Failure {
 /// listens.
 pub(crate) async fn work(task: Task, means: Means, replies: Replies) {
     let id = task.id;
+    TASKS.change("", 1.0);
     let done = tokio::select! {
         done = digitize(task, &means, &replies) => done,
         // Dropping the work drops what it waits for; what computes notices by itself.
         () = replies.closed() => Err(Failure::Abandoned),
         () = means.shutdown.cancelled() => Err(Failure::Abandoned),
     };
+    TASKS.change("", -1.0);
     let last = match done {
-        Ok(finished) => Ok(Reply::Finished(finished)),
+        Ok(finished) => {
+            count(&finished);
+            Ok(Reply::Finished(finished))
+        }
         Err(Failure::Abandoned) if means.shutdown.is_cancelled() => {
             // Nobody may be left to hear it; either way the extent goes to another worker.
             Err(Error::ShuttingDown("this worker").into())
@@ -74,6 +80,19 @@ pub(crate) async fn work(task: Task, means: Means, replies: Replies) {
     };
     if replies.send(last.map(|kind| reply(id, kind))).await.is_ok() {
         debug!(%id, "finished");
+    }
+}
+
+/// Tells those who watch where the time of a task went.
+fn count(finished: &wire::Finished) {
+    for (phase, seconds) in [
+        ("receive", finished.receive_seconds),
+        ("make", finished.make_seconds),
+        ("halo", finished.halo_seconds),
+        ("build", finished.build_seconds),
+        ("digitize", finished.digitize_seconds),
+    ] {
+        TASK_SECONDS.record(phase, seconds);
     }
 }
 
@@ -236,6 +255,9 @@ impl Digitizing {
         let positions = run.first..run.first + run.count;
         digitizer.run_chunks(&self.trajectory, positions, |run, cost| {
             let (first, count) = (run.first, run.touches.len());
+            DIGITIZED.add("", count as u64);
+            EVALUATIONS.add("", cost.evaluations);
+            NODES.add("", cost.nodes);
             debug!(%id, first, count, between = run.between.len(), "positions");
             let mut messages = horma_proto::position_chunks(first, &run.touches, &run.between);
             // The first message of a chunk has what all of it cost.

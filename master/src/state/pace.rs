@@ -70,8 +70,13 @@ impl Pace {
         (expected >= WORTH_IT.max(2 * ready).as_secs_f64()).then_some(expected)
     }
 
+    /// Positions of all its tasks.
+    pub fn positions(&self) -> u64 {
+        self.positions
+    }
+
     /// Seconds that a position takes, once there is something to tell it from.
-    fn cost(&self) -> Option<f64> {
+    pub fn cost(&self) -> Option<f64> {
         (self.positions > 0).then(|| self.busy.as_secs_f64() / self.positions as f64)
     }
 }

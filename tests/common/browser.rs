@@ -1,0 +1,171 @@
+//! Chromium without a screen, driven by what its driver understands: WebDriver, JSON over HTTP.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+/// Far longer than any answer takes.
+const DEADLINE: Duration = Duration::from_secs(90);
+
+/// A browser with one page. Closed when dropped.
+pub struct Browser {
+    driver: Child,
+    address: String,
+    session: String,
+}
+
+impl Browser {
+    /// Nothing, by name, where there is none.
+    pub fn start() -> Option<Self> {
+        let mut driver = Command::new("chromedriver");
+        driver
+            .arg("--port=0")
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null());
+        let Ok(mut driver) = driver.spawn() else {
+            eprintln!("skipped: chromedriver is not installed; tests/run installs it where it can");
+            return None;
+        };
+        let mut lines = BufReader::new(driver.stdout.take().expect("piped")).lines();
+        let port = lines.find_map(|line| {
+            let line = line.expect("text");
+            let (_, port) = line.split_once("successfully on port ")?;
+            port.trim_end_matches('.').parse::<u16>().ok()
+        });
+        let mut browser = Self {
+            driver,
+            address: format!("127.0.0.1:{}", port.expect("a port")),
+            session: String::new(),
+        };
+        let options = json!({"args": ["--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]});
+        let wanted = json!({
+            "goog:chromeOptions": options,
+            "goog:loggingPrefs": {"browser": "ALL"},
+            "timeouts": {"script": 60_000},
+        });
+        let session = browser.call(
+            "POST",
+            "",
+            &json!({"capabilities": {"alwaysMatch": wanted}}),
+        );
+        session["sessionId"]
+            .as_str()
+            .expect("a session")
+            .clone_into(&mut browser.session);
+        Some(browser)
+    }
+
+    pub fn open(&self, url: &str) {
+        self.post("/url", &json!({"url": url}));
+    }
+
+    /// What a piece of JavaScript returns.
+    pub fn ask(&self, script: &str) -> Value {
+        self.post("/execute/sync", &json!({"script": script, "args": []}))
+    }
+
+    /// Waits until an expression is true.
+    pub fn wait(&self, condition: &str) {
+        let script = format!(
+            "const told = arguments[0];
+             const look = () => ({condition}) ? told(true) : requestAnimationFrame(look);
+             look();"
+        );
+        self.post("/execute/async", &json!({"script": script, "args": []}));
+    }
+
+    /// Presses keys where the focus is.
+    pub fn press(&self, key: char) {
+        let keys = [
+            json!({"type": "keyDown", "value": key}),
+            json!({"type": "keyUp", "value": key}),
+        ];
+        let actions = json!([{"type": "key", "id": "keyboard", "actions": keys}]);
+        self.post("/actions", &json!({"actions": actions}));
+    }
+
+    /// Makes the screen so large, and light or dark.
+    pub fn screen(&self, width: u32, height: u32, scheme: &str) {
+        let size =
+            json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
+        self.tell("Emulation.setDeviceMetricsOverride", &size);
+        let media = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
+        self.tell("Emulation.setEmulatedMedia", &media);
+    }
+
+    /// A picture of all of the page, as PNG in base 64.
+    pub fn picture(&self) -> String {
+        let whole = json!({"format": "png", "captureBeyondViewport": true});
+        let taken = self.tell("Page.captureScreenshot", &whole);
+        taken["data"].as_str().expect("a picture").to_owned()
+    }
+
+    /// What the browser complained of.
+    pub fn complaints(&self) -> Vec<Value> {
+        let log = self.post("/se/log", &json!({"type": "browser"}));
+        log.as_array().expect("a list").clone()
+    }
+
+    /// Tells Chromium in its own protocol.
+    fn tell(&self, command: &str, params: &Value) -> Value {
+        self.post(
+            "/goog/cdp/execute",
+            &json!({"cmd": command, "params": params}),
+        )
+    }
+
+    fn post(&self, path: &str, body: &Value) -> Value {
+        self.call("POST", &format!("/{}{path}", self.session), body)
+    }
+
+    fn call(&self, method: &str, path: &str, body: &Value) -> Value {
+        let (status, answer) = self
+            .request(method, path, body)
+            .expect("the driver answers");
+        let value = answer["value"].clone();
+        assert_eq!(status, "200", "{path} {body}: {value}");
+        value
+    }
+
+    fn request(&self, method: &str, path: &str, body: &Value) -> std::io::Result<(String, Value)> {
+        let mut stream = TcpStream::connect(&self.address)?;
+        stream.set_read_timeout(Some(DEADLINE))?;
+        let (address, body) = (&self.address, body.to_string());
+        let length = body.len();
+        write!(
+            stream,
+            "{method} /session{path} HTTP/1.1\r\nHost: {address}\r\nContent-Length: {length}\r\n\r\n{body}"
+        )?;
+        // The browser inherits the connection, so that its end does not come with that of the answer.
+        let mut answer = BufReader::new(stream);
+        let (mut status, mut length) = (String::new(), 0);
+        answer.read_line(&mut status)?;
+        loop {
+            let mut line = String::new();
+            answer.read_line(&mut line)?;
+            match line.trim_end().split_once(':') {
+                Some((name, value)) if name.eq_ignore_ascii_case("content-length") => {
+                    length = value.trim().parse().map_err(std::io::Error::other)?;
+                }
+                Some(_) => {}
+                None => break,
+            }
+        }
+        let mut body = vec![0; length];
+        answer.read_exact(&mut body)?;
+        let status = status.split(' ').nth(1).unwrap_or_default().to_owned();
+        Ok((status, serde_json::from_slice(&body)?))
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // Without its driver the browser would live on.
+        let _ = self.request("DELETE", &format!("/{}", self.session), &json!({}));
+        let _ = self.driver.kill();
+        let _ = self.driver.wait();
+    }
+}
