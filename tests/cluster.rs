@@ -3,6 +3,7 @@
 
 mod common;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use common::{Process, data, job, master, path_of, report, run, sample, scratch, succeed};
@@ -141,6 +142,27 @@ fn surfaces_take_less_than_a_hundredth_of_the_bytes_of_their_points() {
     assert!(path == by_halo && path == by_surface);
     assert!(halo < overlap, "{halo} {overlap}");
     assert!(100 * surface < overlap, "{surface} {overlap}");
+}
+
+/// Each worker has several extents, and in halo holds the rows of several.
+#[test]
+fn more_extents_than_workers_are_the_same() {
+    let (dir, job) = (scratch(), sample());
+    let alone = path_of(&job, dir.path(), "alone", &[]);
+    for distribution in DISTRIBUTIONS {
+        let how = ["--workers", "3", "--distribution", distribution];
+        let each = ["--extents-per-worker", "4"];
+        let path = path_of(&job, dir.path(), distribution, &[&how[..], &each].concat());
+        assert!(path == alone, "{distribution}");
+        let report = report(&dir.path().join(distribution));
+        assert_eq!(report["job"]["cluster"]["extents_per_worker"], 4);
+        assert_eq!(report["extents"].as_array().map(Vec::len), Some(12));
+        check_traffic(distribution, &report);
+        let shares = report["extents"].as_array().expect("extents").iter();
+        let shares = shares.flat_map(|e| e["shares"].as_array().expect("shares"));
+        let workers: BTreeSet<_> = shares.filter_map(|s| s["worker"].as_str()).collect();
+        assert_eq!(workers.len(), 3, "everybody had some");
+    }
 }
 
 #[test]

@@ -465,7 +465,10 @@ async fn submit_raw(address: &str, key: u8) -> Result<u64, Status> {
     let header = SubmitHeader {
         version: horma_proto::VERSION.to_owned(),
         job: Some(job),
-        distribution: wire::Distribution::Overlap.into(),
+        sharing: Some(wire::Sharing {
+            distribution: wire::Distribution::Overlap.into(),
+            extents_per_worker: 1,
+        }),
         key: vec![key; 16].into(),
         name: "raw".to_owned(),
     };

@@ -48,6 +48,8 @@ fn check_table(name: &str, part: &Path, axis: &str, distributions: &[&str]) {
                 let path = path_of(&job, dir.path(), "cluster", &[&given[..], &how].concat());
                 let equal = path == alone;
                 let report = report(&dir.path().join("cluster"));
+                let extents = report["extents"].as_array().expect("extents").len();
+                assert_eq!(extents, workers, "one extent for each");
                 let widest = widest(&report);
                 assert!(
                     workers < 8 || widest < WIDTH,

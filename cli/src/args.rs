@@ -386,6 +386,15 @@ pub(crate) struct How {
         help_heading = "Instead of the job file's"
     )]
     pub distribution: Option<String>,
+    /// Into how many extents the job is cut for each worker. More of them are spread more evenly over
+    /// unequal workers, and each needs rows of its neighbours again [default: 1]
+    #[arg(
+        long,
+        value_name = "N",
+        env = "HORMA_EXTENTS_PER_WORKER",
+        help_heading = "Instead of the job file's"
+    )]
+    pub extents_per_worker: Option<u32>,
 }
 
 impl How {
@@ -394,6 +403,7 @@ impl How {
         Overrides {
             workers,
             distribution: self.distribution.clone(),
+            extents_per_worker: self.extents_per_worker,
             contact: self.contact.clone(),
             method: self.method.clone(),
             delta_u: self.delta_u,

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::process::Stdio;
 use std::time::Duration;
 
-use horma_core::{Distribution, Job, Part, Simd};
+use horma_core::{Job, Part, Sharing, Simd};
 use horma_master::{Config, Master, Outcome, Progress};
 use tokio::net::TcpListener;
 use tokio::process::{Child, Command};
@@ -30,17 +30,14 @@ const WORKER_PATIENCE: &str = "5";
 pub(crate) async fn run(
     part: Part,
     job: Job,
-    distribution: Distribution,
+    sharing: Sharing,
     workers: u32,
     threads: usize,
     simd: Simd,
     progress: Progress,
 ) -> Result<Outcome> {
     let local = start(workers, threads, simd).await?;
-    Ok(local
-        .master
-        .run(part, job, distribution, 1, progress)
-        .await?)
+    Ok(local.master.run(part, job, sharing, 1, progress).await?)
 }
 
 /// A master in this process and its worker processes, until it is dropped.

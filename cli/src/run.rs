@@ -39,7 +39,7 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
             let threads = args.threads.map(usize::from);
             let simd = args.simd.unwrap_or_else(Simd::best);
             let (workers, job) = (file.cluster.workers, file.job);
-            let distribution = file.cluster.distribution;
+            let sharing = file.cluster.sharing;
             if workers == 0 {
                 let threads = threads.unwrap_or_else(system::cores);
                 let stopped = stop.clone();
@@ -49,7 +49,7 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
             }
             let progress = progress(display);
             let threads = threads.unwrap_or(1);
-            let run = cluster::run(part, job, distribution, workers, threads, simd, progress);
+            let run = cluster::run(part, job, sharing, workers, threads, simd, progress);
             // Dropping it stops the workers.
             unless(stop, run).await
         },
@@ -70,9 +70,9 @@ pub(crate) fn submit(args: &args::Submit) -> Result<()> {
         async |part, file, display, stop| {
             display.tell("send", 0, 0);
             let name = name_of(&args.job.file);
-            let distribution = file.cluster.distribution;
+            let sharing = file.cluster.sharing;
             check_divisible(file)?;
-            let sending = submit::send(&remote, &part, file.job, distribution, &name);
+            let sending = submit::send(&remote, &part, file.job, sharing, &name);
             let id = *sent.insert(unless(stop.clone(), sending).await?);
             let progress = progress(display);
             let fetched = unless(stop, submit::fetch(&remote, id, true, &progress)).await;
@@ -95,8 +95,8 @@ fn asked<'a>(job: &'a args::Job, output: &'a Path) -> Asked<'a> {
 fn detach(args: &args::Job, remote: &Remote) -> Result<()> {
     let (part, file, _) = read(&args.file, &args.how.overrides(None))?;
     check_divisible(&file)?;
-    let (name, distribution) = (name_of(&args.file), file.cluster.distribution);
-    let sending = submit::send(remote, &part, file.job, distribution, &name);
+    let (name, sharing) = (name_of(&args.file), file.cluster.sharing);
+    let sending = submit::send(remote, &part, file.job, sharing, &name);
     let id = runtime()?.block_on(sending)?;
     say(&id.to_string());
     Ok(())

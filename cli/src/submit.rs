@@ -2,7 +2,7 @@
 
 use std::hash::{BuildHasher, RandomState};
 
-use horma_core::{Distribution, Job, Part, Record, Trajectory, stitch};
+use horma_core::{Job, Part, Record, Sharing, Trajectory, stitch};
 use horma_master::{Outcome, Progress};
 use horma_proto::wire::path_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
@@ -21,13 +21,13 @@ pub(crate) async fn send(
     remote: &Remote,
     part: &Part,
     job: Job,
-    distribution: Distribution,
+    sharing: Sharing,
     name: &str,
 ) -> Result<u64> {
     let header = SubmitHeader {
         version: VERSION.to_owned(),
         job: Some(horma_proto::job_to_wire(&job)),
-        distribution: horma_proto::distribution_to_wire(distribution).into(),
+        sharing: Some(horma_proto::sharing_to_wire(sharing)),
         key: key().into(),
         name: name.to_owned(),
     };

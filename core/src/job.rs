@@ -78,7 +78,7 @@ impl Discretization {
 /// Finest chordal tolerance, mm: a nanometre, far below any lathe.
 const MIN_TOLERANCE: f64 = 1.0e-6;
 
-/// How workers come by the rows that their positions need. The path does not depend on it.
+/// How workers come by the rows that their positions need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Distribution {
     /// The master sends each worker its rows and those of others that its cutter reaches: the first
@@ -90,6 +90,15 @@ pub enum Distribution {
     Halo,
     /// The master sends surfaces and the parameters of their rows, and workers make the points.
     Surface,
+}
+
+/// How a job is shared among workers. The path does not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sharing {
+    /// How they come by their rows.
+    pub distribution: Distribution,
+    /// Into how many extents the job is cut for each of them: 1 or more.
+    pub extents_per_worker: u32,
 }
 
 /// What the cutter touches.

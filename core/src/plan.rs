@@ -6,7 +6,7 @@ use crate::discretize::{Layout, Model, fill, layout, survey};
 use crate::error::{Error, Result};
 use crate::extent::{Extent, split};
 use crate::grid::SurfaceGrid;
-use crate::job::{Discretization, Distribution, Job, Method};
+use crate::job::{Discretization, Distribution, Job, Method, Sharing};
 use crate::motion::Trajectory;
 use crate::part::{Part, Shape};
 use crate::record::BodyRecord;
@@ -80,8 +80,8 @@ impl Plan {
 pub struct Handout {
     /// What was asked for.
     pub job: Job,
-    /// How workers come by their rows.
-    pub distribution: Distribution,
+    /// How it is shared among workers.
+    pub sharing: Sharing,
     /// The positions.
     pub trajectory: Trajectory,
     /// The outline of each row.
@@ -129,16 +129,16 @@ impl Handout {
     pub fn new(
         part: &Part,
         job: Job,
-        distribution: Distribution,
+        sharing: Sharing,
         memory: u64,
         workers_here: bool,
     ) -> Result<Self> {
-        match distribution {
+        match sharing.distribution {
             Distribution::Overlap | Distribution::Halo => {
                 let plan = Plan::new(part, job, memory)?;
                 Ok(Self {
                     job,
-                    distribution,
+                    sharing,
                     trajectory: plan.trajectory,
                     outlines: plan.model.outlines,
                     bodies: plan.model.bodies,
@@ -147,12 +147,12 @@ impl Handout {
                 })
             }
             Distribution::Surface => {
-                let point_bytes = point_bytes(part, distribution, workers_here)?;
+                let point_bytes = point_bytes(part, sharing.distribution, workers_here)?;
                 let (layout, needed) = lay_out(part, &job, memory, point_bytes)?;
                 let survey = survey(&layout, drop);
                 Ok(Self {
                     job,
-                    distribution,
+                    sharing,
                     trajectory: positions(&job, &survey.outlines)?,
                     outlines: survey.outlines,
                     bodies: survey.bodies,
@@ -163,8 +163,9 @@ impl Handout {
         }
     }
 
-    /// Cuts the positions into at most `parts` extents of about equal predicted work.
-    pub fn split(&self, parts: u32) -> Vec<Extent> {
+    /// Cuts the positions into extents of about equal predicted work, for so many workers.
+    pub fn split(&self, workers: u32) -> Vec<Extent> {
+        let parts = workers.saturating_mul(self.sharing.extents_per_worker);
         split(&self.trajectory, &self.outlines, &self.job, parts)
     }
 
@@ -190,7 +191,7 @@ impl Handout {
     /// The runs in which a worker digitizes an extent: what needs only the extent's own rows first, if
     /// the others are fetched meanwhile.
     pub fn runs(&self, extent: &Extent) -> Vec<Run> {
-        match self.distribution {
+        match self.sharing.distribution {
             Distribution::Overlap | Distribution::Surface => vec![extent.whole()],
             Distribution::Halo => {
                 interior_first(&self.trajectory, &self.outlines, &self.job, extent)

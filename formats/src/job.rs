@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use horma_core::{
     Axis, Contact, Culling, Cutter, Discretization, Distribution, Job, Local, Method, Motion,
-    MotionKind, Point, unit,
+    MotionKind, Point, Sharing, unit,
 };
 
 pub use self::place::Place;
@@ -30,6 +30,11 @@ pub const DEFAULT_FEED: f64 = 2000.0;
 pub const DEFAULT_CLEARANCE: f64 = 20.0;
 /// Most workers that a job can ask for.
 pub const MAX_WORKERS: u32 = 10_000;
+/// Extents for each worker of a job that does not say: an idle worker helps a late one anyway, and
+/// every extent needs its halo again.
+pub const DEFAULT_EXTENTS_PER_WORKER: u32 = 1;
+/// Most extents for each worker that a job can ask for.
+pub const MAX_EXTENTS_PER_WORKER: u32 = 1000;
 
 /// A job, with everything that it leaves open filled in.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,8 +56,8 @@ pub struct JobFile {
 pub struct Cluster {
     /// Worker processes; 0 computes in this one.
     pub workers: u32,
-    /// How workers come by their rows.
-    pub distribution: Distribution,
+    /// How it is shared among them.
+    pub sharing: Sharing,
 }
 
 /// How the path is run on the machine.
@@ -71,6 +76,8 @@ pub struct Overrides {
     pub workers: Option<u32>,
     /// `cluster.distribution`
     pub distribution: Option<String>,
+    /// `cluster.extents_per_worker`
+    pub extents_per_worker: Option<u32>,
     /// `digitizing.contact`
     pub contact: Option<String>,
     /// `digitizing.method`
@@ -316,14 +323,28 @@ impl Source<'_> {
             let what = format!("workers is {workers}, but must be at most {MAX_WORKERS}");
             return Err(self.wrong(raw.workers.as_ref().map(|w| &w.at), what));
         }
+        let extents = raw.extents_per_worker.as_ref();
+        let default = Ok(DEFAULT_EXTENTS_PER_WORKER);
+        let extents_per_worker =
+            extents.map_or(default, |e| self.count(e, "extents_per_worker"))?;
+        if !(1..=MAX_EXTENTS_PER_WORKER).contains(&extents_per_worker) {
+            let what = format!(
+                "extents_per_worker is {extents_per_worker}, but must be 1 to {MAX_EXTENTS_PER_WORKER}"
+            );
+            return Err(self.wrong(extents.map(|e| &e.at), what));
+        }
+        let distribution = self.choose(
+            raw.distribution.as_ref(),
+            "distribution",
+            Distribution::Overlap,
+            &DISTRIBUTIONS,
+        )?;
         Ok(Cluster {
             workers,
-            distribution: self.choose(
-                raw.distribution.as_ref(),
-                "distribution",
-                Distribution::Overlap,
-                &DISTRIBUTIONS,
-            )?,
+            sharing: Sharing {
+                distribution,
+                extents_per_worker,
+            },
         })
     }
 

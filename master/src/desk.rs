@@ -177,12 +177,12 @@ impl Desk {
             key,
             name,
             job,
-            distribution,
+            sharing,
             part,
             pieces,
         } = submission;
         let (memory, here) = self.master.memory();
-        let memory = Handout::predict(&part, &job, distribution, memory, here)?;
+        let memory = Handout::predict(&part, &job, sharing.distribution, memory, here)?;
         drop(part);
         let entry = Entry {
             key,
@@ -357,23 +357,21 @@ impl Desk {
         let sent = read.await.map_err(|_| Error::Panicked)??;
         let (progress, memory) = (self.progress(job), self.share(job));
         progress("discretize", 0, 0);
-        let planning = self
-            .master
-            .plan(sent.part, sent.job, sent.distribution, memory);
+        let planning = self.master.plan(sent.part, sent.job, sent.sharing, memory);
         let planned = planning.await?;
         let workers = self.master.gather(1).await?;
         // Once it is split it stays so, whoever is there.
-        let parts = match self.stage(job) {
-            Some(Stage::Running { parts, .. }) => parts,
+        let workers = match self.stage(job) {
+            Some(Stage::Running { workers, .. }) => workers,
             _ => workers,
         };
         let journal = Journal {
             store: self.store.clone(),
             job,
         };
-        let resumed = journal.resume(planned.plan.clone(), parts).await?;
+        let resumed = journal.resume(planned.plan.clone(), workers).await?;
         self.show(job, resumed.stage.clone());
-        let running = self.master.begin(planned, parts, Some(resumed), progress);
+        let running = self.master.begin(planned, workers, Some(resumed), progress);
         let running = running.await?;
         self.set_work(job, Work::Digitizing);
         let outcome = running.end().await?;

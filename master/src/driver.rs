@@ -66,7 +66,7 @@ pub(crate) enum Message {
     Drain { reply: oneshot::Sender<()> },
     Run {
         plan: Arc<Handout>,
-        parts: u32,
+        workers: u32,
         /// What there is of it already, if it has a journal.
         resumed: Option<Resumed>,
         progress: Progress,
@@ -246,7 +246,7 @@ impl Driver {
             }
             Message::Run {
                 plan,
-                parts,
+                workers,
                 resumed,
                 progress,
                 reply,
@@ -255,7 +255,7 @@ impl Driver {
                 let number = resumed.as_ref().map(|r| r.journal.job);
                 let job = number.unwrap_or(self.next_job);
                 self.next_job = self.next_job.max(job) + 1;
-                let running = RunningJob::new(plan, parts, resumed, progress, reply);
+                let running = RunningJob::new(plan, workers, resumed, progress, reply);
                 let (extents, halos) = (running.extents.len() as u32, running.halos());
                 let done = running.kept.keys().copied().collect();
                 let positions = running.plan.trajectory.positions;

@@ -33,18 +33,18 @@ pub(crate) struct Resumed {
 }
 
 impl Journal {
-    /// Finds what there is of a job that is to be split into so many parts; what was split otherwise is
+    /// Finds what there is of a job that is to be split for so many workers; what was split otherwise is
     /// dropped.
-    pub async fn resume(self, plan: Arc<Handout>, parts: u32) -> Result<Resumed> {
-        let resuming = spawn_blocking(move || self.find(&plan, parts));
+    pub async fn resume(self, plan: Arc<Handout>, workers: u32) -> Result<Resumed> {
+        let resuming = spawn_blocking(move || self.find(&plan, workers));
         resuming.await.map_err(|_| Error::Panicked)?
     }
 
-    fn find(self, plan: &Handout, parts: u32) -> Result<Resumed> {
+    fn find(self, plan: &Handout, workers: u32) -> Result<Resumed> {
         let job = self.job;
-        let extents = plan.split(parts);
+        let extents = plan.split(workers);
         let digest = digest(plan, &extents);
-        if self.store.begin(job, parts, digest)? {
+        if self.store.begin(job, workers, digest)? {
             warn!(job, "planned otherwise than before: its journal is dropped");
         }
         let mut kept = BTreeMap::new();
@@ -59,7 +59,7 @@ impl Journal {
         Ok(Resumed {
             journal: self,
             kept,
-            stage: Stage::Running { parts, digest },
+            stage: Stage::Running { workers, digest },
         })
     }
 

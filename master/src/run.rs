@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use horma_core::{Distribution, Handout, Job, Part, Phase, Record, SubTrajectory, stitch};
+use horma_core::{Handout, Job, Part, Phase, Record, Sharing, SubTrajectory, stitch};
 use horma_proto::metrics::JOB_SECONDS;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::spawn_blocking;
@@ -89,15 +89,15 @@ impl Master {
         &self,
         part: Part,
         job: Job,
-        distribution: Distribution,
+        sharing: Sharing,
         at_least: usize,
         progress: Progress,
     ) -> Result<Outcome> {
         progress("discretize", 0, 0);
         let memory = self.config.memory;
-        let planned = self.plan(part, job, distribution, memory).await?;
-        let parts = self.gather(at_least.max(1)).await?;
-        let running = self.begin(planned, parts, None, progress).await?;
+        let planned = self.plan(part, job, sharing, memory).await?;
+        let workers = self.gather(at_least.max(1)).await?;
+        let running = self.begin(planned, workers, None, progress).await?;
         running.end().await
     }
 
@@ -106,12 +106,12 @@ impl Master {
         &self,
         part: Part,
         job: Job,
-        distribution: Distribution,
+        sharing: Sharing,
         memory: u64,
     ) -> Result<Planned> {
         let begin = Instant::now();
         let here = self.config.workers_here;
-        let plan = move || Handout::new(&part, job, distribution, memory, here);
+        let plan = move || Handout::new(&part, job, sharing, memory, here);
         let planned = spawn_blocking(plan).await;
         let plan = planned.map_err(|_| Error::Panicked)?;
         Ok(Planned {
@@ -135,19 +135,19 @@ impl Master {
         }
     }
 
-    /// Gives a job to the workers, in at most so many parts, of which some may be there already.
+    /// Gives a job to the workers, split for so many of them; some of it may be there already.
     /// Dropping what this returns cancels it.
     pub(crate) async fn begin(
         &self,
         planned: Planned,
-        parts: u32,
+        workers: u32,
         resumed: Option<Resumed>,
         progress: Progress,
     ) -> Result<Running> {
         let (reply, outcome) = oneshot::channel();
         let message = Message::Run {
             plan: planned.plan.clone(),
-            parts,
+            workers,
             resumed,
             progress: progress.clone(),
             reply,

@@ -72,15 +72,15 @@ impl Call {
 }
 
 impl RunningJob {
-    /// Splits a plan into at most `parts` extents, some of which may be there already.
+    /// Splits a plan for so many workers into extents, some of which may be there already.
     pub fn new(
         plan: Arc<Handout>,
-        parts: u32,
+        workers: u32,
         resumed: Option<Resumed>,
         progress: Progress,
         reply: Reply,
     ) -> Self {
-        let extents = plan.split(parts);
+        let extents = plan.split(workers);
         let mut users = vec![0; plan.outlines.len()];
         for &row in extents.iter().flat_map(|e| &e.rows) {
             users[row as usize] += 1;
@@ -123,7 +123,7 @@ impl RunningJob {
     /// For each extent the others whose rows it needs, if rows are to be placed.
     pub fn halos(&self) -> Option<Vec<Vec<u32>>> {
         let halo = |extent: &Extent| extent.halo.iter().map(|h| h.extent).collect();
-        match self.plan.distribution {
+        match self.plan.sharing.distribution {
             Distribution::Overlap | Distribution::Surface => None,
             Distribution::Halo => Some(self.extents.iter().map(halo).collect()),
         }

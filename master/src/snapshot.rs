@@ -233,7 +233,7 @@ fn whole(id: u64, job: &RunningJob, state: JobState) -> Job {
         name: String::new(),
         state,
         reason: None,
-        distribution: match job.plan.distribution {
+        distribution: match job.plan.sharing.distribution {
             Distribution::Overlap => "overlap",
             Distribution::Halo => "halo",
             Distribution::Surface => "surface",

@@ -61,9 +61,9 @@ pub(crate) struct Entry {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Stage {
     Queued,
-    /// It was split into at most so many extents; the digest tells whether it would be again.
+    /// It was split for so many workers; the digest tells whether it would be so again.
     Running {
-        parts: u32,
+        workers: u32,
         digest: u32,
     },
     /// Its result is here, in so many pieces.
@@ -199,12 +199,12 @@ impl Store {
 
     /// An open job is split like this from now on. What is in its journal stays if that was so before;
     /// returns whether anything had to go.
-    pub fn begin(&self, job: u64, parts: u32, digest: u32) -> Result<bool> {
+    pub fn begin(&self, job: u64, workers: u32, digest: u32) -> Result<bool> {
         self.change(|t| {
             let Some(mut entry) = open_entry(t, job)? else {
                 return Ok(false);
             };
-            let stage = Stage::Running { parts, digest };
+            let stage = Stage::Running { workers, digest };
             if entry.stage == stage {
                 return Ok(false);
             }

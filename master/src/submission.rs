@@ -1,7 +1,7 @@
 //! A submission: a job and its part as a client sends them, checked piece by piece as they come, and
 //! again when they come back from the store.
 
-use horma_core::{Distribution, Job, Part};
+use horma_core::{Job, Part, Sharing};
 use horma_proto::{Error, Messages, Result, VERSION, wire};
 
 use crate::store::Pieces;
@@ -23,7 +23,7 @@ struct Header {
     key: u128,
     name: String,
     job: Job,
-    distribution: Distribution,
+    sharing: Sharing,
 }
 
 /// A submission that is complete.
@@ -33,7 +33,7 @@ pub(crate) struct Submission {
     /// What the client calls it.
     pub name: String,
     pub job: Job,
-    pub distribution: Distribution,
+    pub sharing: Sharing,
     pub part: Part,
     /// The same as it was sent.
     pub pieces: Pieces,
@@ -58,7 +58,7 @@ impl Arriving {
         let all = Header {
             key: key.map_err(|_| missing("a key of 16 bytes"))?,
             job: horma_proto::job_from_wire(job)?,
-            distribution: horma_proto::distribution_from_wire(header.distribution())?,
+            sharing: horma_proto::sharing_from_wire(header.sharing.as_ref())?,
             name: header.name,
         };
         self.pieces.push(sealed.data.clone());
@@ -88,7 +88,7 @@ impl Arriving {
             key: header.key,
             name: header.name,
             job: header.job,
-            distribution: header.distribution,
+            sharing: header.sharing,
             part: self.part,
             pieces: self.pieces,
         })

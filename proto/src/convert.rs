@@ -4,8 +4,8 @@
 use bytes::Bytes;
 use horma_core::{
     Body, Contact, Counters, Culling, Cutter, Direction, Discretization, Distribution, Job, Local,
-    Mesh, Method, Motion, MotionKind, Point, Row, RowKind, Shape, Surface, SurfaceGrid, Trajectory,
-    Window,
+    Mesh, Method, Motion, MotionKind, Point, Row, RowKind, Shape, Sharing, Surface, SurfaceGrid,
+    Trajectory, Window,
 };
 
 use crate::error::{Error, Result};
@@ -355,26 +355,40 @@ pub fn grid_from_wire(grid: wire::SurfaceGrid) -> Result<SurfaceGrid> {
     Ok(grid)
 }
 
-/// A distribution for the wire.
-pub fn distribution_to_wire(distribution: Distribution) -> wire::Distribution {
-    match distribution {
+/// How a job is shared, for the wire.
+pub fn sharing_to_wire(sharing: Sharing) -> wire::Sharing {
+    let distribution = match sharing.distribution {
         Distribution::Overlap => wire::Distribution::Overlap,
         Distribution::Halo => wire::Distribution::Halo,
         Distribution::Surface => wire::Distribution::Surface,
+    };
+    wire::Sharing {
+        distribution: distribution.into(),
+        extents_per_worker: sharing.extents_per_worker,
     }
 }
 
-/// A distribution from the wire.
+/// How a job is shared, from the wire.
 ///
 /// # Errors
 /// [`Error::Missing`].
-pub fn distribution_from_wire(distribution: wire::Distribution) -> Result<Distribution> {
-    match distribution {
-        wire::Distribution::Overlap => Ok(Distribution::Overlap),
-        wire::Distribution::Halo => Ok(Distribution::Halo),
-        wire::Distribution::Surface => Ok(Distribution::Surface),
-        wire::Distribution::Unspecified => Err(missing("submission", "a distribution")),
+pub fn sharing_from_wire(sharing: Option<&wire::Sharing>) -> Result<Sharing> {
+    let missing = |field| missing("submission", field);
+    let sharing = sharing.ok_or(missing("how it is shared"))?;
+    let distribution = match sharing.distribution() {
+        wire::Distribution::Overlap => Distribution::Overlap,
+        wire::Distribution::Halo => Distribution::Halo,
+        wire::Distribution::Surface => Distribution::Surface,
+        wire::Distribution::Unspecified => return Err(missing("a distribution")),
+    };
+    let extents_per_worker = sharing.extents_per_worker;
+    if extents_per_worker == 0 {
+        return Err(missing("a number of extents for each worker"));
     }
+    Ok(Sharing {
+        distribution,
+        extents_per_worker,
+    })
 }
 
 fn pack_points(points: &[Point]) -> Bytes {

@@ -30,7 +30,7 @@ pub use chunk::{CHUNK_BYTES, Chunks, Messages, chunk, open, seal};
 pub use chunk::{checksum, pack_positions, position_chunks, unpack_positions};
 pub use convert::{body_from_wire, body_to_wire, job_from_wire, job_to_wire};
 pub use convert::{counters_from_wire, counters_to_wire};
-pub use convert::{distribution_from_wire, distribution_to_wire, grid_from_wire, grid_to_wire};
+pub use convert::{grid_from_wire, grid_to_wire, sharing_from_wire, sharing_to_wire};
 pub use convert::{row_from_wire, row_to_wire, trajectory_from_wire, trajectory_to_wire};
 pub use error::{Answer, Error, Result};
 pub use span::{in_spans, spanned, spans_of};

@@ -35,7 +35,8 @@ impl JobFile {
             "digitizing": digitizing_echo(&self.job),
             "cluster": {
                 "workers": self.cluster.workers,
-                "distribution": name_of(&DISTRIBUTIONS, &self.cluster.distribution),
+                "distribution": name_of(&DISTRIBUTIONS, &self.cluster.sharing.distribution),
+                "extents_per_worker": self.cluster.sharing.extents_per_worker,
             },
             "program": { "feed": self.program.feed, "clearance": self.program.clearance },
         })

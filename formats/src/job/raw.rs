@@ -131,6 +131,7 @@ pub(super) struct RawDigitizing {
 pub(super) struct RawCluster {
     pub(super) workers: Option<Given<i64>>,
     pub(super) distribution: Option<Given<String>>,
+    pub(super) extents_per_worker: Option<Given<i64>>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -172,6 +173,11 @@ impl RawJob {
             &mut self.cluster.distribution,
             "distribution",
             &by.distribution,
+        );
+        put(
+            &mut self.cluster.extents_per_worker,
+            "extents_per_worker",
+            &by.extents_per_worker,
         );
         put(&mut self.digitizing.contact, "contact", &by.contact);
         put(&mut self.digitizing.method, "method", &by.method);

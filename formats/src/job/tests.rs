@@ -20,6 +20,7 @@ method = "brute"
 [cluster]
 workers = 3
 distribution = "overlap"
+extents_per_worker = 4
 [program]
 feed = 1500
 clearance = 5
@@ -68,7 +69,9 @@ fn a_full_job_means_what_it_says() {
         (j.job.contact, j.job.method),
         (Contact::Point, Method::Brute)
     );
-    assert_eq!(j.cluster.workers, 3);
+    let sharing = j.cluster.sharing;
+    assert_eq!((j.cluster.workers, sharing.extents_per_worker), (3, 4));
+    assert_eq!(j.echo()["cluster"]["extents_per_worker"], 4);
     assert_eq!((j.program.feed, j.program.clearance), (1500.0, 5.0));
 }
 
@@ -86,7 +89,11 @@ fn what_is_left_out_has_defaults() {
         (j.job.contact, j.job.method),
         (Contact::Facet, Method::Exact)
     );
-    assert_eq!(j.cluster.workers, 0);
+    let extents = j.cluster.sharing.extents_per_worker;
+    assert_eq!(
+        (j.cluster.workers, extents),
+        (0, DEFAULT_EXTENTS_PER_WORKER)
+    );
     assert_eq!(
         (j.program.feed, j.program.clearance),
         (DEFAULT_FEED, DEFAULT_CLEARANCE)
@@ -152,6 +159,9 @@ fn numbers_out_of_bounds_are_refused_at_their_key() {
     );
     refused("workers = 3", "workers = -1", "workers is -1");
     refused("workers = 3", "workers = 10001", "at most 10000");
+    let each = "extents_per_worker = 4";
+    refused(each, "extents_per_worker = 0", "must be 1 to 1000");
+    refused(each, "extents_per_worker = 1001", "must be 1 to 1000");
     refused(
         "feed = 1500",
         "feed = 0",
@@ -292,6 +302,7 @@ fn what_is_missing_is_asked_for() {
 fn flags_take_the_place_of_the_file() {
     let overrides = Overrides {
         workers: Some(5),
+        extents_per_worker: Some(7),
         tolerance: Some(0.5),
         step: Some(3.0),
         contact: Some("facet".to_owned()),
@@ -302,6 +313,7 @@ fn flags_take_the_place_of_the_file() {
     let text = JOB.replacen("tolerance = 0.02", "grid = { rows = 9, columns = 9 }", 1);
     let j = job(&text, &overrides).expect("valid");
     assert_eq!((j.cluster.workers, j.job.contact), (5, Contact::Facet));
+    assert_eq!(j.cluster.sharing.extents_per_worker, 7);
     assert_eq!(j.job.discretization, Discretization::Tolerance(0.5));
     assert_eq!((j.job.motion.step, j.job.motion.to), (3.0, Some(9.0)));
     assert_eq!(j.job.motion.path_tolerance, Some(0.25));

@@ -82,7 +82,7 @@ impl Model {
                 self.submissions.insert(self.next, pieces);
             }
             Call::Begin { job, digest } if is_open(&job) => {
-                let stage = Stage::Running { parts: 3, digest };
+                let stage = Stage::Running { workers: 3, digest };
                 let entry = self.jobs.get_mut(&job).expect("open");
                 if std::mem::replace(&mut entry.stage, stage.clone()) != stage {
                     self.journal.remove(&job);

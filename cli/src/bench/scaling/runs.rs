@@ -2,7 +2,8 @@
 
 use std::time::Instant;
 
-use horma_core::{Distribution, Job, Part, Record, Simd, ToolPath};
+use horma_core::{Distribution, Job, Part, Record, Sharing, Simd, ToolPath};
+use horma_formats::job::DEFAULT_EXTENTS_PER_WORKER;
 use tokio_util::sync::CancellationToken;
 
 use super::super::check;
@@ -129,8 +130,12 @@ async fn spread(
         Way::Halo => Distribution::Halo,
         Way::Surface => Distribution::Surface,
     };
+    let sharing = Sharing {
+        distribution,
+        extents_per_worker: DEFAULT_EXTENTS_PER_WORKER,
+    };
     let silent = std::sync::Arc::new(|_, _, _| {});
-    let running = local.master.run(part, case.job, distribution, 1, silent);
+    let running = local.master.run(part, case.job, sharing, 1, silent);
     let (path, record) = running.await?;
     let run = Run {
         case: *case,
