@@ -123,7 +123,7 @@ impl Store {
     /// Opens the store in a directory, which is made if it is not there; without one, in memory.
     ///
     /// # Errors
-    /// [`Error::StoreInUse`], [`Error::StoreFormat`], [`Error::Store`]
+    /// [`Error::StoreUnusable`], [`Error::StoreFormat`], [`Error::Store`].
     pub fn open(dir: Option<&Path>) -> Result<Self> {
         let builder = Database::builder();
         let db = match dir {
