@@ -10,6 +10,7 @@ use fearless_simd::Simd as Vectors;
 use rayon::prelude::*;
 
 use crate::between::{self, Probe};
+use crate::bisect::first_without;
 use crate::blocks::{facet_blocks, facet_leaf, point_blocks, point_leaf};
 use crate::contact::{Pose, least_height};
 use crate::cutter::Cutter;
@@ -295,18 +296,9 @@ impl Heuristic {
     }
 }
 
-/// The smallest number up to `enough` that holds, if all above it do.
+/// The smallest number from 1 up to `enough` that holds, if all above it do.
 fn smallest(enough: u32, holds: impl Fn(u32) -> bool) -> u32 {
-    let (mut low, mut high) = (0, enough);
-    while high - low > 1 {
-        let middle = low + (high - low) / 2;
-        if holds(middle) {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
-    high
+    first_without(1..u64::from(enough), |n| !holds(n as u32)) as u32
 }
 
 fn poses(

@@ -204,7 +204,7 @@ impl Reach {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::cutter::Cutter;
     use crate::job::{Contact, Discretization};
@@ -212,7 +212,7 @@ mod tests {
     use crate::runs::interior_first;
     use proptest::prelude::*;
 
-    fn job(radius: f64, path_tolerance: Option<f64>) -> Job {
+    pub fn job(radius: f64, path_tolerance: Option<f64>) -> Job {
         Job {
             discretization: Discretization::Tolerance(0.1),
             cutter: Cutter::ball(radius).expect("valid"),

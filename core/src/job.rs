@@ -1,5 +1,7 @@
 //! What to compute: everything about a job but the part.
 
+use std::fmt;
+
 use crate::cutter::Cutter;
 use serde::{Deserialize, Serialize};
 
@@ -90,6 +92,26 @@ pub enum Distribution {
     Halo,
     /// The master sends surfaces and the parameters of their rows, and workers make the points.
     Surface,
+}
+
+impl Distribution {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Overlap, Self::Halo, Self::Surface];
+
+    /// What it is called wherever it is typed or shown.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Overlap => "overlap",
+            Self::Halo => "halo",
+            Self::Surface => "surface",
+        }
+    }
+}
+
+impl fmt::Display for Distribution {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
 }
 
 /// How a job is shared among workers. The path does not depend on it.

@@ -26,6 +26,7 @@ mod discretize;
 mod grid;
 mod row;
 
+mod bisect;
 mod extent;
 mod plan;
 mod runs;

@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use crate::bisect::first_without;
 use crate::digitize::chunk;
 use crate::extent::{Extent, rows_within, seen};
 use crate::job::Job;
@@ -43,8 +44,8 @@ pub(crate) fn interior_first(
             s.hull(outlines[row as usize].x)
         });
         let clear = |i| seen(trajectory, job, i..i + 1).high + w < x.low;
-        let from = partition(begin, end, clear);
-        let to = partition(begin, end, |i| trajectory.travel(i) - w <= x.high);
+        let from = first_without(begin..end, clear);
+        let to = first_without(begin..end, |i| trajectory.travel(i) - w <= x.high);
         edges.push((from, to));
     }
     edges.sort_unstable();
@@ -130,42 +131,12 @@ fn run_of(trajectory: &Trajectory, outlines: &[Outline], job: &Job, positions: R
     }
 }
 
-/// The first of `begin..end` for which `holds` no longer does.
-fn partition(begin: u64, end: u64, holds: impl Fn(u64) -> bool) -> u64 {
-    let (mut low, mut high) = (begin, end);
-    while low < high {
-        let middle = low + (high - low) / 2;
-        if holds(middle) {
-            low = middle + 1;
-        } else {
-            high = middle;
-        }
-    }
-    low
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cutter::Cutter;
-    use crate::job::{Contact, Discretization, Method};
-    use crate::motion::{Motion, MotionKind};
+    use crate::extent::tests::job;
+    use crate::motion::MotionKind;
     use proptest::prelude::*;
-
-    const JOB: fn() -> Job = || Job {
-        discretization: Discretization::Tolerance(0.1),
-        cutter: Cutter::ball(5.0).expect("valid"),
-        motion: Motion {
-            kind: MotionKind::Helix,
-            step: 3.0,
-            points_per_revolution: 40,
-            from: None,
-            to: None,
-            path_tolerance: None,
-        },
-        contact: Contact::Point,
-        method: Method::Exact,
-    };
 
     const TRAJECTORY: Trajectory = Trajectory {
         kind: MotionKind::Helix,
@@ -192,9 +163,9 @@ mod tests {
             let runs: Vec<Run> = ends.windows(2).map(|e| run(e[0], e[1] - e[0])).collect();
             let gaps: Vec<u64> = gaps.into_iter().collect();
             let missing: Vec<Range<u64>> = gaps.chunks_exact(2).map(|g| g[0]..g[1]).collect();
-            let mut left = remaining(&TRAJECTORY, &[], &JOB(), &runs, &missing);
+            let mut left = remaining(&TRAJECTORY, &[], &job(5.0, None), &runs, &missing);
             if helps {
-                left = from_behind(&TRAJECTORY, &[], &JOB(), left);
+                left = from_behind(&TRAJECTORY, &[], &job(5.0, None), left);
             }
             let mut times = vec![0; 9000];
             for part in &left {
@@ -218,7 +189,7 @@ mod tests {
                 .iter()
                 .map(|&(first, count)| run(first, count))
                 .collect();
-            let runs = from_behind(&TRAJECTORY, &[], &JOB(), runs);
+            let runs = from_behind(&TRAJECTORY, &[], &job(5.0, None), runs);
             runs.iter().map(|r| (r.first, r.count)).collect::<Vec<_>>()
         };
         let chunk = chunk(&TRAJECTORY);

@@ -163,11 +163,10 @@ const LOCAL: Local = Local {
     },
     fallback: true,
 };
-const DISTRIBUTIONS: [(&str, Distribution); 3] = [
-    ("overlap", Distribution::Overlap),
-    ("halo", Distribution::Halo),
-    ("surface", Distribution::Surface),
-];
+const DISTRIBUTIONS: [(&str, Distribution); 3] = {
+    let [a, b, c] = Distribution::ALL;
+    [(a.name(), a), (b.name(), b), (c.name(), c)]
+};
 
 /// The wheels, each with its keys.
 const CUTTERS: [(&str, &[&str]); 4] = [

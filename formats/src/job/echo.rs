@@ -3,7 +3,7 @@
 use horma_core::{Axis, Cutter, Discretization, Job, Local, Method};
 use serde_json::{Value, json};
 
-use super::{CONTACTS, DISTRIBUTIONS, JobFile, KINDS};
+use super::{CONTACTS, JobFile, KINDS};
 
 impl JobFile {
     /// The job in effect, keyed as a job file is, for the report.
@@ -35,7 +35,7 @@ impl JobFile {
             "digitizing": digitizing_echo(&self.job),
             "cluster": {
                 "workers": self.cluster.workers,
-                "distribution": name_of(&DISTRIBUTIONS, &self.cluster.sharing.distribution),
+                "distribution": self.cluster.sharing.distribution.name(),
                 "extents_per_worker": self.cluster.sharing.extents_per_worker,
             },
             "program": { "feed": self.program.feed, "clearance": self.program.clearance },
