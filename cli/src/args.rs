@@ -4,9 +4,10 @@ use std::fmt;
 use std::io::stdout;
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use horma_core::Simd;
+use horma_core::{Distribution, Simd};
 use horma_formats::job::Overrides;
 
 const AFTER_HELP: &str = "\
@@ -87,7 +88,7 @@ Examples:
   horma doctor --master 10.0.0.1:7171 --bind 0.0.0.0:0 --tls-ca ca.pem ...    and the way both ways
 
 Exit codes: 0 no check failed, 2 something here is wrong, 4 master and worker do not reach each other.")]
-    Doctor(Doctor),
+    Doctor(Joining),
     /// Make a test authority, and certificates of it for a master, workers and clients
     ///
     /// For tests and small private networks: one certificate serves all workers, the authority's key
@@ -468,8 +469,8 @@ pub(crate) struct BenchScaling {
     #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "1,2,4,8", value_parser = clap::value_parser!(u32).range(1..=256))]
     pub workers: Vec<u32>,
     /// How workers come by the part; a mesh has no surface
-    #[arg(long, value_name = "D,...", value_delimiter = ',', default_values_t = Way::ALL)]
-    pub distribution: Vec<Way>,
+    #[arg(long, value_name = "D,...", value_delimiter = ',', value_parser = distributions(), default_values_t = Distribution::ALL)]
+    pub distribution: Vec<Distribution>,
     /// How the touch is searched
     #[arg(long, value_name = "M,...", value_delimiter = ',', default_values_t = Search::ALL)]
     pub method: Vec<Search>,
@@ -499,16 +500,12 @@ pub(crate) struct BenchScaling {
     pub quiet: bool,
 }
 
-/// A distribution, as it is typed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Way {
-    Overlap,
-    Halo,
-    Surface,
-}
-
-impl Way {
-    const ALL: [Self; 3] = [Self::Overlap, Self::Halo, Self::Surface];
+fn distributions() -> impl TypedValueParser<Value = Distribution> {
+    let known = PossibleValuesParser::new(Distribution::ALL.map(Distribution::name));
+    known.try_map(|typed| {
+        let found = Distribution::ALL.into_iter().find(|d| d.name() == typed);
+        found.ok_or("not a distribution")
+    })
 }
 
 /// A method whose cost does not depend on where a worker's positions begin, as it is typed.
@@ -520,16 +517,6 @@ pub(crate) enum Search {
 
 impl Search {
     const ALL: [Self; 2] = [Self::Exact, Self::Brute];
-}
-
-impl fmt::Display for Way {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Overlap => "overlap",
-            Self::Halo => "halo",
-            Self::Surface => "surface",
-        })
-    }
 }
 
 impl fmt::Display for Search {
@@ -645,42 +632,15 @@ pub(crate) struct Limits {
 }
 
 #[derive(Debug, Args)]
+#[command(group(ArgGroup::new("way").args(["master", "rendezvous"]).required(true)))]
 pub(crate) struct Worker {
-    /// Where the master listens
-    #[arg(
-        long,
-        value_name = "HOST:PORT",
-        env = "HORMA_MASTER",
-        required_unless_present = "rendezvous",
-        conflicts_with = "rendezvous"
-    )]
-    pub master: Option<String>,
-    /// File into which the master writes its address; waited for, and read again whenever the master
-    /// does not answer
-    #[arg(long, value_name = "FILE", env = "HORMA_RENDEZVOUS")]
-    pub rendezvous: Option<PathBuf>,
-    /// Where to listen; port 0 takes any free one
-    #[arg(
-        long,
-        value_name = "HOST:PORT",
-        env = "HORMA_BIND",
-        default_value = "127.0.0.1:0"
-    )]
-    pub bind: String,
-    /// Address at which others reach this worker; without a port, the port that is bound [default: the
-    /// one that leads to the master]
-    #[arg(long, value_name = "HOST[:PORT]", env = "HORMA_ADVERTISE")]
-    pub advertise: Option<String>,
+    #[command(flatten)]
+    pub joining: Joining,
     /// Where to serve metrics and health over HTTP, for whoever may look: a
     /// port of this machine, or HOST:PORT; port 0 takes any free one. Beyond this machine the rule of
     /// --bind holds: certificates, or --insecure [default: nowhere]
     #[arg(long, value_name = "[HOST:]PORT", env = "HORMA_HTTP")]
     pub http: Option<String>,
-    /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated
-    #[arg(long, conflicts_with = "tls_ca")]
-    pub insecure: bool,
-    #[command(flatten)]
-    pub tls: Tls,
     /// Name of this worker, the same after a restart [default: its place in the job under Slurm, else
     /// host name and process number]
     #[arg(long, env = "HORMA_WORKER_ID")]
@@ -699,9 +659,10 @@ pub(crate) struct Worker {
     pub patience: u64,
 }
 
+/// Where a worker listens and how it finds its master.
 #[derive(Debug, Args)]
-pub(crate) struct Doctor {
-    /// Where the master listens [default: nothing is said about one]
+pub(crate) struct Joining {
+    /// Where the master listens
     #[arg(
         long,
         value_name = "HOST:PORT",
@@ -709,10 +670,11 @@ pub(crate) struct Doctor {
         conflicts_with = "rendezvous"
     )]
     pub master: Option<String>,
-    /// File into which the master writes its address
+    /// File into which the master writes its address; waited for, and read again whenever the master
+    /// does not answer
     #[arg(long, value_name = "FILE", env = "HORMA_RENDEZVOUS")]
     pub rendezvous: Option<PathBuf>,
-    /// Where to listen as a worker would; port 0 takes any free one
+    /// Where to listen; port 0 takes any free one
     #[arg(
         long,
         value_name = "HOST:PORT",
@@ -720,8 +682,8 @@ pub(crate) struct Doctor {
         default_value = "127.0.0.1:0"
     )]
     pub bind: String,
-    /// Address that a worker would tell the master; without a port, the port that is bound [default:
-    /// the one that leads to the master]
+    /// Address at which others reach this worker; without a port, the port that is bound [default: the
+    /// one that leads to the master]
     #[arg(long, value_name = "HOST[:PORT]", env = "HORMA_ADVERTISE")]
     pub advertise: Option<String>,
     /// Allow a bind beyond this machine although traffic is neither encrypted nor authenticated

@@ -19,12 +19,12 @@ use std::path::Path;
 use horma_core::{Motion, Part, place};
 use horma_formats::job::{self, JobFile, Overrides};
 use horma_formats::output::{self, Staging};
-use horma_formats::{part, plot as diagram, sample};
+use horma_formats::{plot as diagram, sample};
 
 use crate::args::BenchKernel;
 use crate::error::Result;
 use crate::progress::Display;
-use crate::say;
+use crate::{run, say};
 use measure::Subject;
 pub(crate) use scaling::scaling;
 use turns::Effort;
@@ -89,8 +89,7 @@ fn read(
 ) -> Result<(JobFile, String, Part)> {
     let (file, name, part) = match job {
         Some(path) => {
-            let file = job::read(path, overrides)?;
-            let (part, warnings) = part::read_all(&file.files)?;
+            let (part, file, warnings) = run::read(path, overrides)?;
             for warning in warnings {
                 display.note(&format!("warning: {warning}"));
             }
@@ -101,10 +100,10 @@ fn read(
             let path = Path::new(sample::JOB);
             let file = job::parse(sample::job_toml(), path, overrides)?;
             let part = sample::last(&sample::LastStyle::WOMEN)?;
+            let part = place(part, file.axis)?;
             (file, "the sample last".to_owned(), part)
         }
     };
-    let part = place(part, file.axis)?;
     Ok((file, name, part))
 }
 

@@ -3,6 +3,7 @@
 use std::cell::Cell;
 use std::time::Duration;
 
+use horma_proto::clock::Pause;
 use horma_proto::transport::{self, Trouble, WANTS_TLS};
 use horma_proto::wire::StatusRequest;
 use horma_proto::wire::master_client::MasterClient;
@@ -13,10 +14,6 @@ use tonic::transport::Channel;
 
 use crate::error::{Error, Result};
 use crate::{args, tls};
-
-/// Pause before the master is tried again; it doubles up to the longest.
-const FIRST_PAUSE: Duration = Duration::from_millis(100);
-const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
 /// Longest time for a call that has a short answer.
 const DEADLINE: Duration = Duration::from_secs(30);
@@ -49,7 +46,7 @@ impl Remote {
         &self,
         mut call: impl AsyncFnMut(Client, &mut Instant) -> std::result::Result<T, Failure>,
     ) -> Result<T> {
-        let mut pause = FIRST_PAUSE;
+        let mut pause = Pause::default();
         loop {
             let outcome = match self.connect().await {
                 Ok(mut client) => {
@@ -62,7 +59,7 @@ impl Remote {
                     let outcome = call(client, &mut latest).await;
                     if latest > before {
                         self.heard.set(Some(latest));
-                        pause = FIRST_PAUSE;
+                        pause = Pause::default();
                     }
                     outcome.map_err(|failure| self.meaning(failure))
                 }
@@ -72,8 +69,7 @@ impl Remote {
                 (Err(Error::NoMaster { .. }), Some(at)) if at.elapsed() < self.patience => {}
                 (outcome, _) => return outcome,
             }
-            tokio::time::sleep(pause).await;
-            pause = (2 * pause).min(LONGEST_PAUSE);
+            pause.wait().await;
         }
     }
 
@@ -134,29 +130,15 @@ pub(crate) fn short<T>(message: T) -> tonic::Request<T> {
 
 /// What the master's status means for the user.
 fn refusal(address: &str, status: &Status) -> Error {
-    let (to, reason) = (address.to_owned(), status.message().to_owned());
+    let (to, reason) = (address, status.message().to_owned());
+    let address = to.to_owned();
     match Answer::of(status) {
-        Answer::Wrong => Error::Refused {
-            address: to,
-            reason,
-        },
-        Answer::Impossible => Error::Impossible {
-            address: to,
-            reason,
-        },
-        Answer::Failed => Error::JobFailed {
-            address: to,
-            reason,
-        },
-        Answer::Forbidden => Error::Untrusted {
-            address: to,
-            reason,
-        },
-        Answer::Stranger => Error::NoSuchJob {
-            address: to,
-            reason,
-        },
-        Answer::Silence => silence(address, status),
+        Answer::Wrong => Error::Refused { address, reason },
+        Answer::Impossible => Error::Impossible { address, reason },
+        Answer::Failed => Error::JobFailed { address, reason },
+        Answer::Forbidden => Error::Untrusted { address, reason },
+        Answer::Stranger => Error::NoSuchJob { address, reason },
+        Answer::Silence => silence(to, status),
     }
 }
 

@@ -4,9 +4,10 @@
 
 use std::fmt;
 use std::net::SocketAddr;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use horma_core::Simd;
+use horma_proto::clock::{incarnation, unix_ms};
 use horma_proto::transport::{self, Trouble, WORD};
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::{DialBackReply, DialBackRequest};
@@ -14,7 +15,7 @@ use horma_proto::{Answer, Role, Tls, VERSION};
 use horma_worker::reachable;
 use tokio::net::TcpListener;
 
-use crate::args::Doctor;
+use crate::args::Joining;
 use crate::cluster::bind;
 use crate::error::{Error, Result};
 use crate::serve::{rendezvous, runtime};
@@ -67,7 +68,7 @@ impl Check {
 }
 
 /// Checks everything and says what it found, check by check.
-pub(crate) fn doctor(args: &Doctor) -> Result<()> {
+pub(crate) fn doctor(args: &Joining) -> Result<()> {
     let runtime = runtime()?;
     let checks = runtime.block_on(examine(args));
     for Check { found, what, words } in &checks {
@@ -84,7 +85,7 @@ pub(crate) fn doctor(args: &Doctor) -> Result<()> {
     }
 }
 
-async fn examine(args: &Doctor) -> Vec<Check> {
+async fn examine(args: &Joining) -> Vec<Check> {
     let mut checks = vec![version(), addresses(), memory()];
     checks.extend(open_files());
     let tls = match tls::load(&args.tls) {
@@ -109,7 +110,7 @@ async fn examine(args: &Doctor) -> Vec<Check> {
         checks.push(Check::new(Found::Warning, "master", words));
         return checks;
     }
-    let master = rendezvous(args.rendezvous.clone(), args.master.clone());
+    let master = rendezvous(args);
     match master.look().await {
         Ok(master) => checks.extend(both_ways(args, &master, &listener, bound, tls.as_ref()).await),
         Err(unknown) => {
@@ -179,7 +180,7 @@ fn certificate(tls: Option<&Tls>) -> Check {
 
 /// The way to the master, and from there back to this host.
 async fn both_ways(
-    args: &Doctor,
+    args: &Joining,
     master: &str,
     listener: &TcpListener,
     bound: SocketAddr,
@@ -190,7 +191,7 @@ async fn both_ways(
         None => reachable(bound, master).to_string(),
     };
     let word = word();
-    let begin = now_ms();
+    let begin = unix_ms();
     let asked = tokio::select! {
         asked = ask(master, &address, word, tls) => asked,
         // Never before the other.
@@ -200,7 +201,7 @@ async fn both_ways(
         Ok(reply) => reply,
         Err(check) => return vec![check],
     };
-    let clocks = (begin.midpoint(now_ms())).abs_diff(reply.unix_ms);
+    let clocks = (begin.midpoint(unix_ms())).abs_diff(reply.unix_ms);
     vec![
         answered(master, &reply),
         if clocks > CLOCKS {
@@ -283,15 +284,10 @@ async fn ask(
     }
 }
 
-fn now_ms() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |t| t.as_millis() as u64)
-}
-
 /// What nobody else would say.
 fn word() -> [u8; WORD] {
     let mut word = [0; WORD];
-    word[..8].copy_from_slice(&system::incarnation().to_le_bytes());
+    word[..8].copy_from_slice(&incarnation().to_le_bytes());
     word[8..].copy_from_slice(b"horma-dr");
     word
 }

@@ -1,7 +1,8 @@
 //! `status` and `cancel`: the jobs of a master elsewhere.
 
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
+use horma_proto::clock::unix_ms;
 use horma_proto::wire::{JobStatus, Stage, StatusRequest};
 
 use crate::args;
@@ -30,7 +31,7 @@ pub(crate) fn status(args: &args::Status) -> Result<()> {
         let jobs: Vec<_> = jobs.iter().map(json).collect();
         say(&format!("{:#}", serde_json::Value::from(jobs)));
     } else {
-        say(&table(&jobs, now_ms()));
+        say(&table(&jobs, unix_ms()));
     }
     Ok(())
 }
@@ -99,9 +100,4 @@ fn stage(job: &JobStatus) -> &'static str {
         Stage::Failed => "failed",
         Stage::Cancelled => "cancelled",
     }
-}
-
-fn now_ms() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |since| since.as_millis() as u64)
 }

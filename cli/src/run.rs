@@ -192,7 +192,7 @@ async fn unless<T>(stop: CancellationToken, work: impl Future<Output = Result<T>
 }
 
 /// A job with its part in place, and what there is to warn of.
-fn read(file: &Path, overrides: &Overrides) -> Result<(Part, JobFile, Vec<String>)> {
+pub(crate) fn read(file: &Path, overrides: &Overrides) -> Result<(Part, JobFile, Vec<String>)> {
     let file = job::read(file, overrides)?;
     let (part, warnings) = part::read_all(&file.files)?;
     let part = place(part, file.axis)?;

@@ -1,19 +1,19 @@
 //! The two servers: master and worker.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::time::Duration;
 
 use horma_core::Simd;
 use horma_master::{Clients, Config, Limits};
 use horma_proto::Role;
+use horma_proto::clock::incarnation;
 use horma_worker::Rendezvous;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
-use crate::args::{Master, Worker};
+use crate::args::{Joining, Master, Worker};
 use crate::cluster::bind;
 use crate::error::{Error, Result};
 use crate::http::{self, Watched};
@@ -79,16 +79,20 @@ pub(crate) fn master(args: &Master) -> Result<()> {
 
 /// Serves as a worker until it is told to stop, or until its master has gone.
 pub(crate) fn worker(args: Worker) -> Result<()> {
-    let tls = tls::load_as(&args.tls, Role::Worker)?;
-    let trusted = tls.is_some() || args.insecure;
+    let joining = &args.joining;
+    let tls = tls::load_as(&joining.tls, Role::Worker)?;
+    let trusted = tls.is_some() || joining.insecure;
     serve(async {
-        let (listener, bound) = listen(&args.bind, trusted).await?;
+        let (listener, bound) = listen(&joining.bind, trusted).await?;
         let http = http::listen(args.http.as_deref(), Role::Worker, trusted).await?;
         let config = horma_worker::Config {
-            master: rendezvous(args.rendezvous, args.master),
+            master: rendezvous(joining),
             id: args.id.unwrap_or_else(|| reach::worker_name(variable)),
-            incarnation: system::incarnation(),
-            advertise: args.advertise.map(|a| reach::advertised(&a, bound)),
+            incarnation: incarnation(),
+            advertise: joining
+                .advertise
+                .as_ref()
+                .map(|a| reach::advertised(a, bound)),
             tls,
             threads: args.threads.map_or_else(system::cores, usize::from),
             simd: args.simd.unwrap_or_else(Simd::best),
@@ -119,12 +123,12 @@ async fn unless_again(ending: impl Future<Output = Result<()>>) -> Result<()> {
     }
 }
 
-/// One of the two is given: parsing sees to it.
-pub(crate) fn rendezvous(file: Option<PathBuf>, address: Option<String>) -> Rendezvous {
-    file.map_or_else(
-        || Rendezvous::Address(address.unwrap_or_default()),
-        Rendezvous::File,
-    )
+/// How the master is found; one of the two is given.
+pub(crate) fn rendezvous(joining: &Joining) -> Rendezvous {
+    match (&joining.rendezvous, &joining.master) {
+        (Some(file), _) => Rendezvous::File(file.clone()),
+        (None, address) => Rendezvous::Address(address.clone().unwrap_or_default()),
+    }
 }
 
 fn variable(name: &str) -> Option<String> {

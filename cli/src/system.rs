@@ -101,13 +101,6 @@ pub(crate) fn host_name() -> String {
     System::host_name().unwrap_or_else(|_| "localhost".to_owned())
 }
 
-/// A number that differs from one start of a process to the next.
-pub(crate) fn incarnation() -> u64 {
-    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    let nanoseconds = since.map_or(0, |d| d.as_nanos() as u64);
-    nanoseconds.rotate_left(20) ^ u64::from(std::process::id())
-}
-
 /// Returns when the user, or the system on somebody's behalf, asks to stop.
 pub(crate) async fn interrupted() {
     let interrupt = async {

@@ -8,11 +8,12 @@ mod rules;
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use bytes::Bytes;
 use horma_core::Handout;
 use horma_proto::Error as Refusal;
+use horma_proto::clock::since_1970;
 use horma_proto::metrics::JOBS_ENDED;
 use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
 use tokio::task::spawn_blocking;
@@ -25,7 +26,7 @@ use crate::error::{Error, Result};
 use crate::journal::Journal;
 use crate::store::{Entry, Gone, Stage, Store};
 use crate::submission::{self, Submission};
-use crate::{Limits, Master, Progress, result};
+use crate::{Limits, Master, Progress, blocking, result};
 
 /// What a client is told.
 type Answer<T> = std::result::Result<T, Refusal>;
@@ -187,7 +188,7 @@ impl Desk {
         let entry = Entry {
             key,
             name,
-            submitted: now(),
+            submitted: since_1970(),
             memory,
             stage: Stage::Queued,
         };
@@ -229,15 +230,14 @@ impl Desk {
     /// Ends a job, unless it is over.
     pub async fn cancel(self: &Arc<Self>, job: u64) -> Answer<()> {
         drop(self.watch(job)?);
-        let end = move |store: &Store| store.end(job, Stage::Cancelled { at: now() });
+        let end = move |store: &Store| store.end(job, Stage::Cancelled { at: since_1970() });
         self.change(job, end).await.map_err(Refusal::from)
     }
 
     /// A piece of a result.
     pub async fn result(&self, job: u64, piece: u32) -> Result<Option<Bytes>> {
         let store = self.store.clone();
-        let reading = spawn_blocking(move || store.result(job, piece));
-        reading.await.map_err(|_| Error::Panicked)?
+        blocking(move || store.result(job, piece)).await
     }
 
     /// Drops a result that the client has.
@@ -254,8 +254,7 @@ impl Desk {
         how: impl FnOnce(&Store) -> Result<Option<Stage>> + Send + 'static,
     ) -> Result<()> {
         let store = self.store.clone();
-        let changing = spawn_blocking(move || how(&store));
-        if let Some(stage) = changing.await.map_err(|_| Error::Panicked)?? {
+        if let Some(stage) = blocking(move || how(&store)).await? {
             self.show(job, stage);
         }
         Ok(())
@@ -330,7 +329,7 @@ impl Desk {
     async fn perform_and_keep(self: &Arc<Self>, job: u64) -> Result<()> {
         let kept = match self.perform(job).await {
             Ok(pieces) => {
-                let finish = move |store: &Store| store.finish(job, now(), &pieces);
+                let finish = move |store: &Store| store.finish(job, since_1970(), &pieces);
                 self.change(job, finish).await
             }
             Err(error) => Err(error),
@@ -350,11 +349,11 @@ impl Desk {
     /// Plans a job, has it digitized, and makes pieces of the result.
     async fn perform(&self, job: u64) -> Result<Vec<Bytes>> {
         let store = self.store.clone();
-        let read = spawn_blocking(move || {
+        let read = move || {
             let again = submission::again(store.submission(job)?);
             again.map_err(|e| Error::StoreDamaged(format!("job {job}: {e}")))
-        });
-        let sent = read.await.map_err(|_| Error::Panicked)??;
+        };
+        let sent = blocking(read).await?;
         let (progress, memory) = (self.progress(job), self.share(job));
         progress("discretize", 0, 0);
         let planning = self.master.plan(sent.part, sent.job, sent.sharing, memory);
@@ -375,8 +374,7 @@ impl Desk {
         let running = running.await?;
         self.set_work(job, Work::Digitizing);
         let outcome = running.end().await?;
-        let pieces = spawn_blocking(move || result::to_pieces(&outcome));
-        pieces.await.map_err(|_| Error::Panicked)?
+        blocking(move || result::to_pieces(&outcome)).await
     }
 
     /// Tells how far a job is, for as long as it is known.
@@ -409,7 +407,7 @@ impl Desk {
     /// Drops results that are too old or too many, and forgets jobs that ended long ago.
     async fn expire(self: &Arc<Self>) {
         let ended = self.ended();
-        let Expired { dropped, forgotten } = expired(ended, &self.limits, now());
+        let Expired { dropped, forgotten } = expired(ended, &self.limits, since_1970());
         for job in dropped {
             let drop = move |store: &Store| store.drop_result(job, Gone::Dropped);
             if let Err(error) = self.change(job, drop).await {
@@ -464,15 +462,10 @@ impl Known {
 fn failed(error: Error) -> Stage {
     let status = Status::from(Refusal::from(error));
     Stage::Failed {
-        at: now(),
+        at: since_1970(),
         code: status.code().into(),
         reason: status.message().to_owned(),
     }
-}
-
-fn now() -> Duration {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.unwrap_or_default()
 }
 
 /// Tells those who watch that a job is over, and how it ended.

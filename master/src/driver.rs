@@ -6,10 +6,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 use horma_core::{ExtentRecord, Handout};
 use horma_proto::TaskId;
+use horma_proto::clock::incarnation;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
@@ -109,12 +110,6 @@ pub(crate) fn start(
     };
     tokio::spawn(driver.run(messages, shutdown));
     (inbox, workers, incarnation)
-}
-
-/// A number that no earlier start of a master had.
-fn incarnation() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |t| t.as_nanos() as u64)
 }
 
 struct Driver {

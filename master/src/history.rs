@@ -2,8 +2,8 @@
 //! over. It forgets what is old, and nothing depends on it.
 
 use std::collections::VecDeque;
-use std::time::{SystemTime, UNIX_EPOCH};
 
+use horma_proto::clock::unix_ms;
 use horma_proto::metrics::ATTEMPTS_LOST;
 use serde::Serialize;
 
@@ -66,10 +66,9 @@ impl History {
         if self.happenings.len() == HAPPENINGS {
             self.happenings.pop_front();
         }
-        let since = SystemTime::now().duration_since(UNIX_EPOCH);
         self.happenings.push_back(Happening {
             id: self.last,
-            at: since.map_or(0, |t| t.as_millis() as u64),
+            at: unix_ms(),
             bad,
             text,
         });

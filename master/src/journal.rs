@@ -11,6 +11,7 @@ use prost::Message;
 use tokio::task::spawn_blocking;
 use tracing::{info, warn};
 
+use crate::blocking;
 use crate::error::{Error, Result};
 use crate::store::{Pieces, Stage, Store};
 
@@ -36,8 +37,7 @@ impl Journal {
     /// Finds what there is of a job that is to be split for so many workers; what was split otherwise is
     /// dropped.
     pub async fn resume(self, plan: Arc<Handout>, workers: u32) -> Result<Resumed> {
-        let resuming = spawn_blocking(move || self.find(&plan, workers));
-        resuming.await.map_err(|_| Error::Panicked)?
+        blocking(move || self.find(&plan, workers)).await
     }
 
     fn find(self, plan: &Handout, workers: u32) -> Result<Resumed> {

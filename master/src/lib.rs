@@ -109,6 +109,14 @@ pub type Progress = Arc<dyn Fn(&'static str, u64, u64) + Send + Sync>;
 /// How long open calls may take to notice a shutdown.
 const DRAIN: Duration = Duration::from_secs(5);
 
+/// Has work done that blocks or computes, on a thread for such.
+pub(crate) async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T> + Send + 'static,
+) -> Result<T> {
+    let done = tokio::task::spawn_blocking(work).await;
+    done.map_err(|_| Error::Panicked)?
+}
+
 /// Starts a master on `listener`. It serves workers and clients until `shutdown`; the handle runs
 /// jobs from within this process, and through the window others look.
 ///

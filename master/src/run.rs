@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 use horma_core::{Handout, Job, Part, Phase, Record, Sharing, SubTrajectory, stitch};
 use horma_proto::metrics::JOB_SECONDS;
 use tokio::sync::{mpsc, oneshot, watch};
-use tokio::task::spawn_blocking;
 use tokio_util::sync::CancellationToken;
 
 use crate::driver::{self, Message};
@@ -14,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::history::Happening;
 use crate::journal::Resumed;
 use crate::snapshot::Snapshot;
-use crate::{Config, Outcome, Progress};
+use crate::{Config, Outcome, Progress, blocking};
 
 /// A handle to a running master.
 #[derive(Debug, Clone)]
@@ -111,11 +110,9 @@ impl Master {
     ) -> Result<Planned> {
         let begin = Instant::now();
         let here = self.config.workers_here;
-        let plan = move || Handout::new(&part, job, sharing, memory, here);
-        let planned = spawn_blocking(plan).await;
-        let plan = planned.map_err(|_| Error::Panicked)?;
+        let plan = move || Handout::new(&part, job, sharing, memory, here).map_err(Error::Plan);
         Ok(Planned {
-            plan: Arc::new(plan.map_err(Error::Plan)?),
+            plan: Arc::new(blocking(plan).await?),
             took: begin.elapsed(),
         })
     }
@@ -190,17 +187,16 @@ impl Running {
         let plan = self.planned.plan;
         let path = stitch(plan.trajectory, parts).map_err(Error::Stitch)?;
         let stitched = begin.elapsed();
-        JOB_SECONDS.record("discretize", self.planned.took.as_secs_f64());
-        JOB_SECONDS.record("digitize", digitized.as_secs_f64());
-        JOB_SECONDS.record("stitch", stitched.as_secs_f64());
         record.phases = [
             ("discretize", self.planned.took),
             ("digitize", digitized),
             ("stitch", stitched),
         ]
-        .map(|(name, time)| Phase {
-            name: name.to_owned(),
-            seconds: time.as_secs_f64(),
+        .map(|(name, time)| {
+            let seconds = time.as_secs_f64();
+            JOB_SECONDS.record(name, seconds);
+            let name = name.to_owned();
+            Phase { name, seconds }
         })
         .into();
         record.bodies.clone_from(&plan.bodies);

@@ -253,19 +253,27 @@ impl RunningJob {
             worker: self.made_by[&(extent, attempt)].clone(),
             positions,
         };
-        let placed = self.placed.get(&extent).copied().unwrap_or_default();
-        let with_tasks = self.rows_sent.get(&extent).copied().unwrap_or_default();
         record.shares = received.shares().into_iter().map(share).collect();
         record.counters = received.cost();
-        record.rows_sent = placed.rows + with_tasks;
-        record.bytes_sent = placed.bytes + coming.sent.load(Ordering::Relaxed);
+        (record.rows_sent, record.bytes_sent) = self.sent(extent);
         record.bytes_received = coming.bytes.load(Ordering::Relaxed);
-        record.place_seconds = placed.seconds;
+        record.place_seconds = self
+            .placed
+            .get(&extent)
+            .map_or(0.0, |placed| placed.seconds);
         let kept = (Arc::new(received.into_parts()), record);
         if let Some(journal) = &self.journal {
             journal.keep(extent, kept.clone());
         }
         self.kept.insert(extent, kept);
+    }
+
+    /// Rows and bytes that have been sent for an extent, placed before tasks or with them.
+    fn sent(&self, extent: u32) -> (u64, u64) {
+        let placed = self.placed.get(&extent).copied().unwrap_or_default();
+        let rows = self.rows_sent.get(&extent).copied().unwrap_or_default();
+        let bytes = self.coming[extent as usize].sent.load(Ordering::Relaxed);
+        (placed.rows + rows, placed.bytes + bytes)
     }
 
     /// Positions that have arrived, and those inserted between them.
@@ -286,10 +294,9 @@ impl RunningJob {
                 traffic.bytes_between_workers += record.bytes_fetched;
                 traffic.bytes_of_results += record.bytes_received;
             } else {
-                let placed = self.placed.get(&extent).copied().unwrap_or_default();
-                let with_tasks = self.rows_sent.get(&extent).copied().unwrap_or_default();
-                traffic.rows_sent += placed.rows + with_tasks;
-                traffic.bytes_to_workers += placed.bytes + coming.sent.load(Ordering::Relaxed);
+                let (rows, bytes) = self.sent(extent);
+                traffic.rows_sent += rows;
+                traffic.bytes_to_workers += bytes;
                 traffic.bytes_of_results += coming.bytes.load(Ordering::Relaxed);
             }
         }

@@ -1,8 +1,9 @@
 //! What workers and clients see of the master.
 
 use std::sync::Arc;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
+use horma_proto::clock::unix_ms;
 use horma_proto::wire::master_server::Master as Api;
 use horma_proto::wire::path_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
@@ -140,10 +141,9 @@ impl Api for Service {
             let reached = transport::reach(&address, Role::Worker, self.tls.as_ref(), word).await;
             reached.err().unwrap_or_default()
         };
-        let since = SystemTime::now().duration_since(UNIX_EPOCH);
         Ok(Response::new(DialBackReply {
             version: VERSION.to_owned(),
-            unix_ms: since.map_or(0, |t| t.as_millis() as u64),
+            unix_ms: unix_ms(),
             trouble,
         }))
     }

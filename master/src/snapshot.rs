@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use horma_core::{Distribution, Traffic};
+use horma_core::Traffic;
 use horma_proto::metrics::{EXTENTS, JOBS, WORKERS};
 use serde::Serialize;
 
@@ -233,11 +233,7 @@ fn whole(id: u64, job: &RunningJob, state: JobState) -> Job {
         name: String::new(),
         state,
         reason: None,
-        distribution: match job.plan.sharing.distribution {
-            Distribution::Overlap => "overlap",
-            Distribution::Halo => "halo",
-            Distribution::Surface => "surface",
-        },
+        distribution: job.plan.sharing.distribution.name(),
         positions,
         arrived,
         inserted,

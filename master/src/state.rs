@@ -406,10 +406,13 @@ fn extent(state: &mut State, task: TaskId) -> Option<&mut Extent> {
 
 /// Whether someone digitizes this extent.
 fn runs(state: &State, task: TaskId) -> bool {
-    let same = |(t, step): (TaskId, Step)| {
-        (t.job, t.extent, step) == (task.job, task.extent, Step::Digitize)
-    };
-    state.workers.values().any(|w| w.task.is_some_and(same))
+    let mut tasks = state.workers.values().filter_map(|w| w.task);
+    tasks.any(|(t, step)| digitizes(task, t, step))
+}
+
+/// Whether somebody at this step of a task digitizes the extent of another.
+fn digitizes(of: TaskId, task: TaskId, step: Step) -> bool {
+    (task.job, task.extent, step) == (of.job, of.extent, Step::Digitize)
 }
 
 /// An extent that somebody stopped at waits, unless another one is still at it.
@@ -436,8 +439,8 @@ fn deliver(state: &mut State, worker: &str, task: TaskId, left: u64, commands: &
     }
     commands.push(Command::Keep { task });
     let reason = format!("worker {worker} completed it");
-    let same = |t: &TaskId| (t.job, t.extent) == (task.job, task.extent);
-    take_off(state, same, Some(Step::Digitize), &reason, commands);
+    let same = |t, step| digitizes(task, t, step);
+    take_off(state, same, &reason, commands);
     complete(state, task.job, commands);
 }
 
@@ -450,20 +453,18 @@ fn fail(state: &mut State, job: u64, error: Error, commands: &mut Vec<Command>) 
 
 /// Takes every task of a job that is over off its worker.
 fn release(state: &mut State, job: u64, reason: &str, commands: &mut Vec<Command>) {
-    take_off(state, |t| t.job == job, None, reason, commands);
+    take_off(state, |t, _| t.job == job, reason, commands);
 }
 
-/// Takes tasks off their workers, all of them or those at one step.
+/// Takes tasks off their workers.
 fn take_off(
     state: &mut State,
-    which: impl Fn(&TaskId) -> bool,
-    step: Option<Step>,
+    which: impl Fn(TaskId, Step) -> bool,
     reason: &str,
     commands: &mut Vec<Command>,
 ) {
     for worker in state.workers.values_mut() {
-        let is_it = |(t, s): &mut (TaskId, Step)| which(t) && step.is_none_or(|step| step == *s);
-        if let Some((task, _)) = worker.task.take_if(is_it) {
+        if let Some((task, _)) = worker.task.take_if(|(task, step)| which(*task, *step)) {
             let reason = reason.to_owned();
             commands.push(Command::Abort { task, reason });
         }

@@ -12,8 +12,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use redb::backends::InMemoryBackend;
 use redb::{
-    Database, DatabaseError, Key, ReadableDatabase, ReadableTable, Table, TableDefinition,
-    WriteTransaction,
+    Database, DatabaseError, ReadableDatabase, ReadableTable, TableDefinition, WriteTransaction,
 };
 use serde::{Deserialize, Serialize};
 
@@ -33,8 +32,9 @@ const JOBS: TableDefinition<u64, &[u8]> = TableDefinition::new("jobs");
 /// Jobs by the key that their client made up.
 const KEYS: TableDefinition<u128, u64> = TableDefinition::new("keys");
 /// Pieces by job and number.
-const SUBMISSIONS: TableDefinition<(u64, u32), &[u8]> = TableDefinition::new("submissions");
-const RESULTS: TableDefinition<(u64, u32), &[u8]> = TableDefinition::new("results");
+type PiecesTable = TableDefinition<'static, (u64, u32), &'static [u8]>;
+const SUBMISSIONS: PiecesTable = TableDefinition::new("submissions");
+const RESULTS: PiecesTable = TableDefinition::new("results");
 /// Pieces by job, extent and number.
 const JOURNAL: TableDefinition<(u64, u32, u32), &[u8]> = TableDefinition::new("journal");
 
@@ -182,10 +182,7 @@ impl Store {
             numbers.insert("next job", job + 1)?;
             keys.insert(entry.key, job)?;
             put(t, job, entry)?;
-            let mut table = t.open_table(SUBMISSIONS)?;
-            for (i, piece) in (0..).zip(pieces) {
-                table.insert((job, i), &seal(piece)[..])?;
-            }
+            put_pieces(t, SUBMISSIONS, job, pieces)?;
             Ok((job, true))
         })
     }
@@ -210,8 +207,7 @@ impl Store {
             }
             entry.stage = stage;
             put(t, job, &entry)?;
-            let mut journal = t.open_table(JOURNAL)?;
-            drop_pieces(&mut journal, (job, 0, 0), (job, u32::MAX, u32::MAX))
+            drop_journal(t, job)
         })
     }
 
@@ -264,14 +260,9 @@ impl Store {
             };
             entry.stage = stage;
             put(t, job, &entry)?;
-            let mut submissions = t.open_table(SUBMISSIONS)?;
-            drop_pieces(&mut submissions, (job, 0), (job, u32::MAX))?;
-            let mut journal = t.open_table(JOURNAL)?;
-            drop_pieces(&mut journal, (job, 0, 0), (job, u32::MAX, u32::MAX))?;
-            let mut results = t.open_table(RESULTS)?;
-            for (i, piece) in (0..).zip(result) {
-                results.insert((job, i), &seal(piece)[..])?;
-            }
+            drop_pieces(t, SUBMISSIONS, job)?;
+            drop_journal(t, job)?;
+            put_pieces(t, RESULTS, job, result)?;
             Ok(Some(entry.stage))
         })
     }
@@ -292,8 +283,7 @@ impl Store {
             if let Stage::Done { at, .. } = entry.stage {
                 entry.stage = Stage::Gone { at, why };
                 put(t, job, &entry)?;
-                let mut results = t.open_table(RESULTS)?;
-                drop_pieces(&mut results, (job, 0), (job, u32::MAX))?;
+                drop_pieces(t, RESULTS, job)?;
             }
             Ok(Some(entry.stage))
         })
@@ -307,9 +297,7 @@ impl Store {
             };
             t.open_table(KEYS)?.remove(entry.key)?;
             t.open_table(JOBS)?.remove(job)?;
-            let mut results = t.open_table(RESULTS)?;
-            drop_pieces(&mut results, (job, 0), (job, u32::MAX))?;
-            Ok(())
+            drop_pieces(t, RESULTS, job)
         })
     }
 
@@ -360,16 +348,26 @@ fn from_json(json: &[u8]) -> Result<Entry> {
     serde_json::from_slice(json).map_err(|e| Error::StoreDamaged(e.to_string()))
 }
 
-/// Returns whether there were any.
-fn drop_pieces<K>(table: &mut Table<'_, K, &'static [u8]>, first: K, last: K) -> Result<bool>
-where
-    K: Key + for<'a> std::borrow::Borrow<K::SelfType<'a>> + 'static,
-{
-    let mut any = false;
-    for row in table.extract_from_if(first..=last, |_, _| true)? {
-        row?;
-        any = true;
+fn put_pieces(t: &WriteTransaction, table: PiecesTable, job: u64, pieces: &[Bytes]) -> Result<()> {
+    let mut table = t.open_table(table)?;
+    for (i, piece) in (0..).zip(pieces) {
+        table.insert((job, i), &seal(piece)[..])?;
     }
+    Ok(())
+}
+
+fn drop_pieces(t: &WriteTransaction, table: PiecesTable, job: u64) -> Result<()> {
+    let mut table = t.open_table(table)?;
+    table.retain_in((job, 0)..=(job, u32::MAX), |_, _| false)?;
+    Ok(())
+}
+
+/// Returns whether there was anything.
+fn drop_journal(t: &WriteTransaction, job: u64) -> Result<bool> {
+    let mut journal = t.open_table(JOURNAL)?;
+    let all = (job, 0, 0)..=(job, u32::MAX, u32::MAX);
+    let any = journal.range(all.clone())?.next().is_some();
+    journal.retain_in(all, |_, _| false)?;
     Ok(any)
 }
 

@@ -12,6 +12,7 @@ mod span;
 mod task;
 
 mod accept;
+pub mod clock;
 mod limit;
 pub mod metrics;
 mod refused;

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use horma_proto::clock::Pause;
 use horma_proto::metrics::REGISTERED;
 use horma_proto::transport::{self, Trouble, WANTS_TLS};
 use horma_proto::wire::master_client::MasterClient;
@@ -19,10 +20,6 @@ use crate::Config;
 use crate::error::{Error, Result};
 use crate::rendezvous::reachable;
 use crate::store::Store;
-
-/// Pause before the master is tried again; it doubles up to the longest.
-const FIRST_PAUSE: Duration = Duration::from_millis(100);
-const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
 /// Longest time for one call.
 const DEADLINE: Duration = Duration::from_secs(5);
@@ -41,7 +38,7 @@ pub(crate) async fn keep(
         let mut heard: Option<Instant> = None;
         let mut going = Vec::new();
         let begin = Instant::now();
-        let mut pause = FIRST_PAUSE;
+        let mut pause = Pause::default();
         loop {
             let reason = match config.master.look().await {
                 Err(unknown) => unknown,
@@ -54,7 +51,7 @@ pub(crate) async fn keep(
                             store.keep_master(incarnation);
                             member(registered, true);
                             info!(master, address, "registered");
-                            pause = FIRST_PAUSE;
+                            pause = Pause::default();
                             let silence =
                                 heartbeats(&mut client, config, store, interval, &mut going).await;
                             member(registered, false);
@@ -85,8 +82,7 @@ pub(crate) async fn keep(
                     }),
                 };
             }
-            tokio::time::sleep(pause).await;
-            pause = (2 * pause).min(LONGEST_PAUSE);
+            pause.wait().await;
         }
     };
     tokio::select! {

@@ -49,22 +49,24 @@ impl Store {
 
     /// Drops what another start of a master placed.
     pub fn keep_master(&self, master: u64) {
-        let mut held = self.lock();
-        held.retain(|_, held| held.master == master);
-        count(&held);
+        self.retain(|_, held| held.master == master);
     }
 
     /// Drops the rows of jobs below `next_job` that are not going on.
     pub fn keep_jobs(&self, jobs: &[u64], next_job: u64) {
-        let mut held = self.lock();
-        held.retain(|(job, extent), _| {
+        self.retain(|(job, extent), _| {
             let keep = *job >= next_job || jobs.contains(job);
             if !keep {
                 debug!(job, extent, "rows dropped");
             }
             keep
         });
-        count(&held);
+    }
+
+    fn retain(&self, keep: impl Fn(&(u64, u32), &Held) -> bool) {
+        let mut all = self.lock();
+        all.retain(|place, held| keep(place, held));
+        count(&all);
     }
 
     fn lock(&self) -> MutexGuard<'_, BTreeMap<(u64, u32), Held>> {

@@ -85,10 +85,7 @@ fn latest(state: &State, now: Duration, name: &String) -> Option<Case> {
         extents.filter_map(move |(i, extent)| case(job, i, extent))
     });
     // Of equals the first.
-    all.reduce(|best, next| {
-        let (a, b) = (best.rank, next.rank);
-        if (b.0, b.1) > (a.0, a.1) { next } else { best }
-    })
+    all.reduce(|best, next| if next.rank > best.rank { next } else { best })
 }
 
 #[cfg(test)]

@@ -1,11 +1,12 @@
 //! The figures as diagrams. A colour is a distribution; what is not measured is dashed.
 
+use horma_core::Distribution;
 use horma_formats::plot::{Curve, Plot};
 
 use super::Experiment;
 use super::model::{Fit, Projection};
 use super::summary::Summary;
-use crate::args::{Search, Way};
+use crate::args::Search;
 
 /// Colour of what belongs to no distribution.
 const PLAIN: usize = 3;
@@ -127,7 +128,7 @@ fn curves(
     value: fn(&Summary) -> f64,
 ) -> Vec<Curve> {
     let mut found: Vec<Curve> = Vec::new();
-    for way in [Way::Overlap, Way::Halo, Way::Surface] {
+    for way in Distribution::ALL {
         let alike = summaries.iter().filter(|s| s.is(search, way));
         let points: Vec<[f64; 2]> = alike.map(|s| [f64::from(s.workers()), value(s)]).collect();
         if points.iter().any(|[_, y]| *y > 0.0) {
@@ -158,10 +159,10 @@ fn powers() -> impl Iterator<Item = f64> {
     (0..=10).map(|k| f64::from(1 << k))
 }
 
-fn color(way: Way) -> usize {
+fn color(way: Distribution) -> usize {
     match way {
-        Way::Overlap => 0,
-        Way::Halo => 1,
-        Way::Surface => 2,
+        Distribution::Overlap => 0,
+        Distribution::Halo => 1,
+        Distribution::Surface => 2,
     }
 }

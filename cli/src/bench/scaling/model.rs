@@ -6,14 +6,16 @@
 //! together, since each has to go into a hierarchy; by brute force those of one, since each position looks
 //! at all of them. Nothing is known here of congestion, of stragglers, or of memory.
 
+use horma_core::Distribution;
+
 use super::summary::Summary;
-use crate::args::{Search, Way};
+use crate::args::Search;
 
 /// The overlap that fits one method and distribution best.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Fit {
     pub search: Search,
-    pub way: Way,
+    pub way: Distribution,
     /// Rows of the whole part, n.
     pub rows: f64,
     /// Rows of an extent beyond its share, o.
@@ -88,7 +90,7 @@ const HALO_LATENCIES: f64 = 2.0;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Projection {
     pub search: Search,
-    pub way: Way,
+    pub way: Distribution,
     pub points: Vec<Projected>,
 }
 
@@ -210,7 +212,7 @@ mod tests {
     use super::*;
 
     /// A cluster whose work and bytes follow the model exactly: 100 rows, an overlap of 10.
-    fn measured(way: Way, workers: u32) -> Summary {
+    fn measured(way: Distribution, workers: u32) -> Summary {
         let p = f64::from(workers);
         let rows = if workers == 1 {
             100.0
@@ -244,11 +246,13 @@ mod tests {
 
     #[test]
     fn a_model_is_found_again_and_projected() {
-        let mut summaries: Vec<_> = [1, 2, 4, 8].map(|p| measured(Way::Overlap, p)).into();
+        let mut summaries: Vec<_> = [1, 2, 4, 8]
+            .map(|p| measured(Distribution::Overlap, p))
+            .into();
         summaries.push(Summary {
             cluster: None,
             own_cpu: 9.0,
-            ..measured(Way::Overlap, 1)
+            ..measured(Distribution::Overlap, 1)
         });
         let fits = fit(100, &summaries);
         let [found] = fits[..] else {
@@ -283,7 +287,7 @@ mod tests {
 
     #[test]
     fn one_number_of_workers_gives_no_projection() {
-        let summaries = [measured(Way::Halo, 4)];
+        let summaries = [measured(Distribution::Halo, 4)];
         let fits = fit(100, &summaries);
         let network = Network {
             gbit: 1.0,
@@ -291,7 +295,7 @@ mod tests {
         };
         assert_eq!(fits.len(), 1);
         assert!(project(&summaries, &fits, network).is_empty());
-        assert!(fit(100, &[measured(Way::Halo, 1)]).is_empty());
+        assert!(fit(100, &[measured(Distribution::Halo, 1)]).is_empty());
     }
 
     #[test]

@@ -7,7 +7,7 @@ use horma_formats::job::DEFAULT_EXTENTS_PER_WORKER;
 use tokio_util::sync::CancellationToken;
 
 use super::super::check;
-use crate::args::{Search, Way};
+use crate::args::Search;
 use crate::error::{Error, Result};
 use crate::progress::Display;
 use crate::{cluster, here, system};
@@ -18,7 +18,7 @@ pub(super) struct Case {
     pub search: Search,
     pub job: Job,
     /// Nothing for one thread of this process.
-    pub cluster: Option<(Way, u32)>,
+    pub cluster: Option<(Distribution, u32)>,
 }
 
 impl Case {
@@ -46,6 +46,25 @@ pub(super) struct Run {
     /// CPU time of each worker, s.
     pub worker_cpu: Vec<f64>,
     pub record: Record,
+}
+
+impl Run {
+    /// CPU time of a worker on average, s.
+    pub fn mean_cpu(&self) -> f64 {
+        let workers = self.worker_cpu.len().max(1);
+        self.all_cpu() / workers as f64
+    }
+
+    /// CPU time of the busiest worker, s.
+    pub fn most_cpu(&self) -> f64 {
+        self.worker_cpu.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// CPU time of all workers, s.
+    pub fn all_cpu(&self) -> f64 {
+        // That of nobody is 0, where the library's sum has −0.
+        self.worker_cpu.iter().fold(0.0, |sum, cpu| sum + cpu)
+    }
 }
 
 /// Runs all cases in turn, as many rounds as asked for.
@@ -116,7 +135,7 @@ async fn alone(part: Part, case: &Case, round: u32) -> Result<(Run, ToolPath)> {
 async fn spread(
     part: Part,
     case: &Case,
-    way: Way,
+    way: Distribution,
     workers: u32,
     round: u32,
 ) -> Result<(Run, ToolPath)> {
@@ -125,13 +144,8 @@ async fn spread(
     let start = begin.elapsed().as_secs_f64();
     // To start processes is no master's work.
     let before = own_cpu();
-    let distribution = match way {
-        Way::Overlap => Distribution::Overlap,
-        Way::Halo => Distribution::Halo,
-        Way::Surface => Distribution::Surface,
-    };
     let sharing = Sharing {
-        distribution,
+        distribution: way,
         extents_per_worker: DEFAULT_EXTENTS_PER_WORKER,
     };
     let silent = std::sync::Arc::new(|_, _, _| {});

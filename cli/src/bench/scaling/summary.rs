@@ -1,15 +1,15 @@
 //! Medians of runs, and what follows from them: speed-up, efficiency, the critical path, imbalance.
 
-use horma_core::ExtentRecord;
+use horma_core::{Distribution, ExtentRecord};
 
 use super::runs::Run;
-use crate::args::{Search, Way};
+use crate::args::Search;
 
 /// A case over all its rounds. Times in s.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Summary {
     pub search: Search,
-    pub cluster: Option<(Way, u32)>,
+    pub cluster: Option<(Distribution, u32)>,
     /// Positions of the path.
     pub positions: u64,
     pub wall: Spread,
@@ -72,7 +72,7 @@ impl Summary {
         self.critical_speedup / f64::from(self.workers())
     }
 
-    pub fn is(&self, search: Search, way: Way) -> bool {
+    pub fn is(&self, search: Search, way: Distribution) -> bool {
         self.search == search && self.cluster.is_some_and(|(w, _)| w == way)
     }
 }
@@ -98,8 +98,6 @@ pub(super) fn all(runs: &[Run]) -> Vec<Summary> {
 fn summarize(runs: &[&Run]) -> Summary {
     let of = |value: &dyn Fn(&Run) -> f64| spread(runs.iter().map(|r| value(r)).collect()).median;
     let case = runs[0].case;
-    let mean = |r: &Run| sum(r.worker_cpu.iter().copied()) / r.worker_cpu.len().max(1) as f64;
-    let most = |r: &Run| r.worker_cpu.iter().copied().fold(0.0, f64::max);
     let traffic = |r: &Run| r.record.traffic.unwrap_or_default();
     let extents = |r: &Run| r.record.extents.len() as f64;
     let rows = |r: &Run| {
@@ -112,12 +110,12 @@ fn summarize(runs: &[&Run]) -> Summary {
         positions: runs[0].positions,
         wall: spread(runs.iter().map(|r| r.wall).collect()),
         own_cpu: of(&|r| r.own_cpu),
-        worker_cpu: [of(&mean), of(&most)],
-        workers_cpu: of(&|r| sum(r.worker_cpu.iter().copied())),
-        critical: of(&|r| r.own_cpu + most(r)),
+        worker_cpu: [of(&Run::mean_cpu), of(&Run::most_cpu)],
+        workers_cpu: of(&Run::all_cpu),
+        critical: of(&|r| r.own_cpu + r.most_cpu()),
         imbalance: of(&|r| {
-            if mean(r) > 0.0 {
-                most(r) / mean(r) - 1.0
+            if r.mean_cpu() > 0.0 {
+                r.most_cpu() / r.mean_cpu() - 1.0
             } else {
                 0.0
             }

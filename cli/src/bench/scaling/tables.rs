@@ -248,9 +248,7 @@ pub(super) fn csv(runs: &[Run]) -> String {
         };
         let record = &run.record;
         let traffic = record.traffic.unwrap_or_default();
-        let cpu = &run.worker_cpu;
-        let mean = cpu.iter().sum::<f64>() / cpu.len().max(1) as f64;
-        let most = cpu.iter().copied().fold(0.0, f64::max);
+        let (mean, most) = (run.mean_cpu(), run.most_cpu());
         let rows: u64 = record.extents.iter().map(|e| u64::from(e.rows)).sum();
         // A string takes everything.
         let _ = write!(
