@@ -18,7 +18,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use common::{Process, horma, job, path_of, sample, scratch, text, wait_until};
+use common::{Process, brute_job, horma, path_of, sample, scratch, text, wait_until};
 use fastrand::Rng;
 use lab::Lab;
 use proxy::Proxy;
@@ -157,19 +157,12 @@ fn faults_by_chance_cost_time_and_never_a_byte() {
 
 /// A job that takes a second or more, most of it in the middle of extents.
 fn slow_job(dir: &Path, contact: &str) -> PathBuf {
-    let (rows, columns) = match contact {
-        "point" => (159, 120),
-        _ => (20, 16),
+    let grid = match contact {
+        "point" => [159, 120],
+        _ => [20, 16],
     };
-    let more = format!(
-        "axis = \"auto\"
-[discretization]\ngrid = {{ rows = {rows}, columns = {columns} }}
-[cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
-[motion]\nstep = 2.0\npoints_per_revolution = 90
-[digitizing]\ncontact = \"{contact}\"\nmethod = \"brute\"\n"
-    );
     let part = sample().with_file_name("last.step");
-    job(dir, &format!("{contact}.toml"), &[&part], &more)
+    brute_job(dir, &format!("{contact}.toml"), &part, contact, grid)
 }
 
 /// Runs the job to a good end, whatever goes wrong on the way.
@@ -200,8 +193,7 @@ fn run(plan: &Plan, lab: Option<&Lab>, job: &Path, out: &Path) {
         ];
         args.extend(&insecure);
         let mut master = on(0, "master", "info", &args);
-        let line = master.wait_for(&["listening on"]);
-        let address = line.rsplit(' ').next().expect("a word").to_owned();
+        let address = master.wait_for_word(&["listening on"]);
         (master, address)
     };
     let (mut master, address) = start(&any(0));

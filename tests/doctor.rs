@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime};
 
 use rcgen::{BasicConstraints, CertificateParams, IsCa, Issuer, KeyPair};
 
-use common::{Process, master, run, scratch, succeed, text, texts};
+use common::{master, run, scratch, succeed, text, texts};
 
 /// What was said about something, and the exit code.
 fn examined(args: &[&str]) -> (Option<i32>, String) {
@@ -134,15 +134,11 @@ fn certificates_are_looked_at_and_held_against_the_masters() {
     let dir = scratch();
     let dir = dir.path();
     let [ours, theirs] = ["ours", "theirs"].map(|name| authority(dir, name, "10"));
-    let mut args = vec!["master", "--bind", "127.0.0.1:0"];
     let serving = files(&ours, "master");
-    args.extend(strings(&serving));
-    let mut process = Process::start("master", &args, "info");
-    let line = process.wait_for(&["listening on"]);
-    let address = line.rsplit(' ').next().expect("a word");
+    let (_master, address) = master(&strings(&serving));
     let with = |given: &[String], code: i32, lines: &[(&str, &str, &[&str])]| {
         check(
-            &[&["--master", address], &strings(given)[..]].concat(),
+            &[&["--master", &address], &strings(given)[..]].concat(),
             code,
             lines,
         );

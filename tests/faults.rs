@@ -9,7 +9,8 @@ mod slow;
 
 use std::path::{Path, PathBuf};
 
-use common::{Process, data, job, master, path_of, report, sample, scratch, text, worker};
+use common::{Process, brute_job, data, master, path_of, report, sample, scratch, text};
+use common::{wait_until, worker};
 use horma_proto::wire::digitize_reply::Kind;
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::worker_server::{Worker, WorkerServer};
@@ -24,14 +25,7 @@ fn long_job(dir: &Path) -> PathBuf {
 }
 
 fn long_job_of(dir: &Path, part: &Path, contact: &str) -> PathBuf {
-    let more = format!(
-        "axis = \"auto\"
-[discretization]\ngrid = {{ rows = 159, columns = 120 }}
-[cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
-[motion]\nstep = 2.0\npoints_per_revolution = 90
-[digitizing]\ncontact = \"{contact}\"\nmethod = \"brute\"\n"
-    );
-    job(dir, "long.toml", &[part], &more)
+    brute_job(dir, "long.toml", part, contact, [159, 120])
 }
 
 fn submit(job: &Path, master: &str, out: &Path) -> Process {
@@ -177,13 +171,15 @@ fn an_interrupt_stops_a_run_and_its_workers() {
         run.signal("-INT");
         let (code, log) = run.end();
         assert_eq!(code, Some(130), "{log}");
+        // They were killed: one that is left to itself looks for its master before it ends.
+        assert!(!log.contains("no answer"), "{log}");
         for child in children {
-            let state = std::fs::read_to_string(format!("/proc/{child}/stat"));
-            // An orphan that nobody has reaped yet has ended as well.
-            assert!(
-                state.is_err() || state.is_ok_and(|s| s.contains(") Z ")),
-                "{child} lives on"
-            );
+            // A killed process is gone a moment after its outputs are.
+            wait_until(&format!("the end of {child}"), || {
+                let state = std::fs::read_to_string(format!("/proc/{child}/stat"));
+                // An orphan that nobody has reaped yet has ended as well.
+                state.is_err() || state.is_ok_and(|s| s.contains(") Z "))
+            });
         }
         assert_eq!(std::fs::read_dir(&out).expect("there").count(), 0);
     }

@@ -74,12 +74,8 @@ impl Authority {
     /// A worker, and the address at which it listens.
     fn worker(&self, master: &str, id: &str) -> (Process, String) {
         let args = self.args("worker");
-        let mut all = vec!["worker", "--master", master, "--id", id, "--threads", "1"];
-        all.extend(words(&args));
-        let mut process = Process::start(id, &all, "info");
-        let address = process.wait_for(&["listening on"]);
-        process.wait_for(&["registered"]);
-        let address = address.rsplit(' ').next().expect("a word").to_owned();
+        let mut process = common::worker_with(master, id, &words(&args));
+        let address = process.wait_for_word(&["listening on"]);
         (process, address)
     }
 }

@@ -207,8 +207,7 @@ fn asked(service: &str) -> HealthCheckRequest {
 async fn a_server_says_that_it_serves_until_it_is_told_to_stop() {
     let (master, address) = master(&[]);
     let mut worker = worker_with(&address, "w", &[]);
-    let line = worker.wait_for(&["listening on"]);
-    let of_worker = line.rsplit(' ').next().expect("a word").to_owned();
+    let of_worker = worker.wait_for_word(&["listening on"]);
     let [serving, not] = [ServingStatus::Serving, ServingStatus::NotServing].map(i32::from);
     let servers = [
         (worker, of_worker, Role::Worker, "horma.cluster.v1.Worker"),

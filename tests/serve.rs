@@ -17,12 +17,7 @@ use tonic::{Code, Status};
 /// A job of seconds on one worker, in as many extents as there are workers.
 fn long_job(dir: &Path) -> PathBuf {
     let part = sample().with_file_name("last.step");
-    let more = "axis = \"auto\"
-[discretization]\ngrid = { rows = 159, columns = 120 }
-[cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
-[motion]\nstep = 2.0\npoints_per_revolution = 90
-[digitizing]\ncontact = \"point\"\nmethod = \"brute\"\n";
-    common::job(dir, "long.toml", &[&part], more)
+    common::brute_job(dir, "long.toml", &part, "point", [159, 120])
 }
 
 /// A job of a moment.
@@ -220,17 +215,7 @@ fn what_takes_too_long_is_left_to_the_store_and_a_second_signal_waits_for_nothin
 fn a_worker_whose_master_goes_for_good_in_the_middle_of_a_job_says_so() {
     let dir = scratch();
     let (first, address) = master(&["--lease", "1"]);
-    let args = [
-        "worker",
-        "--master",
-        &address,
-        "--id",
-        "w",
-        "--threads",
-        "1",
-    ];
-    let mut worker = Process::start("w", &[&args[..], &["--patience", "1"]].concat(), "debug");
-    worker.wait_for(&["registered"]);
+    let mut worker = common::worker_with(&address, "w", &["--patience", "1"]);
     detach(&long_job(dir.path()), &address, &[]);
     worker.wait_for(&["going on", "jobs=[1]"]);
     drop(first);

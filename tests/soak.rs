@@ -17,12 +17,14 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use fastrand::Rng;
+
 use common::{Process, horma, master, path_of, sample, scratch, succeed, text, texts};
 
 /// How long a client looks for a master that is just being started again, and for its path.
 const PATIENCE: &str = "300";
 
-const WORKERS: u64 = 3;
+const WORKERS: usize = 3;
 
 /// Jobs that are over and that the master still knows, at least.
 const REMEMBERED: usize = 10_000;
@@ -56,20 +58,9 @@ const AWAY: usize = 5;
 const WORKERS_KILLED: usize = 6;
 const MASTERS_KILLED: usize = 7;
 
-/// Marsaglia's xorshift: what happens follows from the seed.
-struct Chance(u64);
-
-impl Chance {
-    fn new(seed: u64, of: u64) -> Self {
-        Self((seed << 16 | of).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
-    }
-
-    fn below(&mut self, n: u64) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 32) % n
-    }
+/// Chance of one client, or of whoever kills workers: what happens follows from the seed.
+fn chance(seed: u64, of: u64) -> Rng {
+    Rng::with_seed(seed << 16 | of)
 }
 
 fn setting(name: &str, default: u64) -> u64 {
@@ -96,13 +87,13 @@ fn a_serving_master_loses_nothing_under_clients_and_kills() {
     let end = Instant::now() + Duration::from_secs(60 * minutes);
     let mut memory = Vec::new();
     thread::scope(|scope| {
-        let working = scope.spawn(|| kill_workers(&soak, &mut Chance::new(seed, 0)));
+        let working = scope.spawn(|| kill_workers(&soak, &mut chance(seed, 0)));
         let serving = scope.spawn(|| kill_masters(&soak, life));
         let all: Vec<_> = (1..=clients)
             .map(|client| {
                 let soak = &soak;
                 scope.spawn(move || {
-                    let mut chance = Chance::new(seed, client);
+                    let mut chance = chance(seed, client);
                     while Instant::now() < end {
                         one_job(soak, client, &mut chance);
                     }
@@ -173,13 +164,13 @@ impl Soak {
 }
 
 /// What one client does with one job.
-fn one_job(soak: &Soak, client: u64, chance: &mut Chance) {
-    let (job, expected, distribution) = &soak.jobs[chance.below(soak.jobs.len() as u64) as usize];
+fn one_job(soak: &Soak, client: u64, chance: &mut Rng) {
+    let (job, expected, distribution) = &soak.jobs[chance.usize(..soak.jobs.len())];
     let out = soak.dir.join(format!("client-{client}"));
     let send = ["submit", text(job), "--distribution", distribution];
     let quiet = ["-q", "--no-verify", "-o", text(&out)];
     soak.count(SENT);
-    let sent = match chance.below(10) {
+    let sent = match chance.u32(..10) {
         0..6 => soak.ask(&[&send[..], &quiet].concat()),
         6..9 => soak
             .ask(&[&send[..], &["--detach"]].concat())
@@ -213,7 +204,7 @@ fn lost(soak: &Soak, why: &str) {
 }
 
 /// Keeps workers going: now and then one is killed, or told to stop, and another comes.
-fn kill_workers(soak: &Soak, chance: &mut Chance) {
+fn kill_workers(soak: &Soak, chance: &mut Rng) {
     let mut next = 0;
     let mut start = || {
         next += 1;
@@ -223,9 +214,9 @@ fn kill_workers(soak: &Soak, chance: &mut Chance) {
     };
     let mut workers: Vec<Process> = (0..WORKERS).map(|_| start()).collect();
     while !soak.over.load(Ordering::Relaxed) {
-        thread::sleep(Duration::from_millis(500 + 100 * chance.below(30)));
-        let worker = workers.remove(chance.below(WORKERS) as usize);
-        worker.signal(["-KILL", "-TERM"][chance.below(2) as usize]);
+        thread::sleep(Duration::from_millis(500 + 100 * chance.u64(..30)));
+        let worker = workers.remove(chance.usize(..WORKERS));
+        worker.signal(["-KILL", "-TERM"][chance.usize(..2)]);
         drop(worker);
         soak.count(WORKERS_KILLED);
         workers.push(start());

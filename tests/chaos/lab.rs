@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use crate::common::forget_settings;
+
 /// Some hosts, gone when dropped.
 pub struct Lab {
     script: PathBuf,
@@ -96,11 +98,7 @@ impl Lab {
 
     fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new("bash");
-        for (name, _) in std::env::vars_os() {
-            if name.to_string_lossy().starts_with("HORMA_") {
-                command.env_remove(name);
-            }
-        }
+        forget_settings(&mut command);
         command
             .arg(&self.script)
             .args(args)

@@ -16,13 +16,18 @@ const DEADLINE: Duration = Duration::from_secs(120);
 /// The binary, without the caller's settings.
 pub fn horma() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_horma"));
+    forget_settings(&mut command);
+    command.stdin(Stdio::null());
+    command
+}
+
+/// Takes the caller's settings from a command.
+pub fn forget_settings(command: &mut Command) {
     for (name, _) in std::env::vars_os() {
         if name.to_string_lossy().starts_with("HORMA_") {
             command.env_remove(name);
         }
     }
-    command.stdin(Stdio::null());
-    command
 }
 
 /// Runs the binary to its end.
@@ -78,6 +83,20 @@ pub fn job(dir: &Path, name: &str, files: &[&Path], more: &str) -> PathBuf {
     let text = format!("[part]\nfiles = [{}]\n{more}", files.join(", "));
     std::fs::write(&job, text).expect("writable");
     job
+}
+
+/// A job over a part by brute force, which takes long enough to be interrupted in the middle of each
+/// extent.
+pub fn brute_job(dir: &Path, name: &str, part: &Path, contact: &str, grid: [u32; 2]) -> PathBuf {
+    let [rows, columns] = grid;
+    let more = format!(
+        "axis = \"auto\"
+[discretization]\ngrid = {{ rows = {rows}, columns = {columns} }}
+[cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
+[motion]\nstep = 2.0\npoints_per_revolution = 90
+[digitizing]\ncontact = \"{contact}\"\nmethod = \"brute\"\n"
+    );
+    job(dir, name, &[part], &more)
 }
 
 /// `path.csv` of a run of `job` with more arguments.
@@ -170,6 +189,12 @@ impl Process {
         }
     }
 
+    /// The last word of such a line.
+    pub fn wait_for_word(&mut self, words: &[&str]) -> String {
+        let line = self.wait_for(words);
+        line.rsplit(' ').next().expect("a word").to_owned()
+    }
+
     /// Whether it has said, by now, a line that contains all of `words`.
     pub fn has_said(&mut self, words: &[&str]) -> bool {
         self.seen.extend(self.lines.try_iter());
@@ -236,18 +261,21 @@ pub fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
 
 /// A master on a port of the system's choice, and its address.
 pub fn master(more: &[&str]) -> (Process, String) {
+    master_saying("info", more)
+}
+
+/// The same, with what it is to log.
+pub fn master_saying(log: &str, more: &[&str]) -> (Process, String) {
     let mut args = vec!["master", "--bind", "127.0.0.1:0"];
     args.extend(more);
-    let mut process = Process::start("master", &args, "info");
-    let line = process.wait_for(&["listening on"]);
-    let address = line.rsplit(' ').next().expect("a word").to_owned();
+    let mut process = Process::start("master", &args, log);
+    let address = process.wait_for_word(&["listening on"]);
     (process, address)
 }
 
 /// Where that process serves HTTP.
 pub fn http(process: &mut Process) -> String {
-    let line = process.wait_for(&["http on"]);
-    line.rsplit(' ').next().expect("a word").to_owned()
+    process.wait_for_word(&["http on"])
 }
 
 /// A worker of that master, once it is registered.

@@ -107,7 +107,7 @@ fn wide_job(dir: &Path) -> PathBuf {
 [cutter]\nkind = \"cylinder\"\nradius = 40.0\nwidth = 1000.0
 [motion]\nstep = 5.0\npoints_per_revolution = 60\nfrom = 20.0\nto = 250.0
 [cluster]\ndistribution = \"halo\"\n";
-    job(dir, "wide.toml", &[&part], more)
+    common::job(dir, "wide.toml", &[&part], more)
 }
 
 /// The reasons of the attempts that were lost, each with who made it.

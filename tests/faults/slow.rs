@@ -6,11 +6,7 @@ use super::*;
 
 /// A master that never takes a silent worker for lost, and tells when positions come.
 fn patient_master() -> (Process, String) {
-    let args = ["master", "--bind", "127.0.0.1:0", "--lease", "600"];
-    let mut process = Process::start("master", &args, "info,horma_master=debug");
-    let line = process.wait_for(&["listening on"]);
-    let address = line.rsplit(' ').next().expect("a word").to_owned();
-    (process, address)
+    common::master_saying("info,horma_master=debug", &["--lease", "600"])
 }
 
 /// How many positions each worker brought of each extent.
