@@ -22,7 +22,7 @@ use crate::error::{Error, Result};
 const FILE: &str = "jobs.redb";
 
 /// Changes whenever what is written here changes.
-const FORMAT: u64 = 1;
+const FORMAT: u64 = 2;
 
 /// Memory for pages that were read or written lately; in memory alone there is nothing to gain.
 const CACHE: usize = 32 << 20;
@@ -54,6 +54,8 @@ pub(crate) struct Entry {
     pub submitted: Duration,
     /// Bytes of memory that it is expected to take.
     pub memory: u64,
+    /// The span for which it is done, if the client or the master told of one.
+    pub trace: Option<String>,
     pub stage: Stage,
 }
 
