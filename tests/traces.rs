@@ -108,13 +108,8 @@ impl Collector {
     }
 
     fn named(&self, name: &str) -> Vec<Span> {
-        let named = self
-            .spans()
-            .iter()
-            .filter(|s| s.name == name)
-            .cloned()
-            .collect();
-        named
+        let all = self.spans();
+        all.iter().filter(|s| s.name == name).cloned().collect()
     }
 
     fn only(&self, name: &str) -> Span {
@@ -221,6 +216,49 @@ fn a_job_is_one_trace_through_all_processes() {
             .all(|(g, f)| g.instance != f.instance && g.service == f.service)
     );
     parents(&collector.named("digitize"), &tasks);
+}
+
+/// Spans and whose they are, as the documentation has them.
+fn documented() -> BTreeSet<(String, String)> {
+    let page = include_str!("../docs/traces.md");
+    let rows = page.lines().filter_map(|line| line.strip_prefix("| `"));
+    let pairs = rows.flat_map(|row| {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        let name = cells[0].trim_matches('`').to_owned();
+        let of = cells[1].split(", ");
+        of.map(move |of| (name.clone(), format!("horma-{of}")))
+            .collect::<Vec<_>>()
+    });
+    pairs.collect()
+}
+
+#[test]
+fn spans_are_those_that_the_documentation_lists() {
+    let (collector, _runtime, url) = Collector::listen();
+    let (dir, sample) = (scratch(), sample());
+    let (master, address) = master(&["--otlp", &url]);
+    let workers = ["a", "b"].map(|id| worker_with(&address, id, &["--otlp", &url]));
+    let ways: [&[&str]; 4] = [
+        &["submit", "--master", &address, "--distribution", "halo"],
+        &["run", "--workers", "2", "--distribution", "halo"],
+        &["run", "--workers", "2", "--distribution", "surface"],
+        &["run"],
+    ];
+    for way in ways {
+        let out = dir.path().join("out");
+        let args = ["--otlp", &url, "-q", text(&sample), "-o", text(&out)];
+        succeed(&[way, &args].concat());
+    }
+    for process in workers.into_iter().chain([master]) {
+        process.signal("-TERM");
+        assert_eq!(process.end().0, Some(0));
+    }
+    let spans = collector.spans();
+    let sent: BTreeSet<_> = spans
+        .iter()
+        .map(|s| (s.name.clone(), s.service.clone()))
+        .collect();
+    assert_eq!(sent, documented());
 }
 
 #[test]

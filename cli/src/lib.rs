@@ -55,7 +55,7 @@ pub fn main() -> ExitCode {
     let log = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_ansi(false)
-        .with_filter(filter.and(filter_fn(|what| what.is_event())));
+        .with_filter(filter.and(filter_fn(|what| !what.is_span())));
     tracing_subscriber::registry()
         .with(log)
         .with(traces.as_ref().map(Traces::layer))
