@@ -341,12 +341,15 @@ fn open_entry(t: &WriteTransaction, job: u64) -> Result<Option<Entry>> {
 }
 
 fn put(t: &WriteTransaction, job: u64, entry: &Entry) -> Result<()> {
-    let json = serde_json::to_vec(entry).map_err(|e| Error::StoreDamaged(e.to_string()))?;
-    t.open_table(JOBS)?.insert(job, &json[..])?;
+    t.open_table(JOBS)?.insert(job, &to_json(entry)?[..])?;
     Ok(())
 }
 
-fn from_json(json: &[u8]) -> Result<Entry> {
+pub(crate) fn to_json(entry: &Entry) -> Result<Vec<u8>> {
+    serde_json::to_vec(entry).map_err(|e| Error::StoreDamaged(e.to_string()))
+}
+
+pub(crate) fn from_json(json: &[u8]) -> Result<Entry> {
     serde_json::from_slice(json).map_err(|e| Error::StoreDamaged(e.to_string()))
 }
 
@@ -374,11 +377,11 @@ fn drop_journal(t: &WriteTransaction, job: u64) -> Result<bool> {
 }
 
 /// A piece behind its checksum.
-fn seal(piece: &[u8]) -> Vec<u8> {
+pub(crate) fn seal(piece: &[u8]) -> Vec<u8> {
     [&crc32c::crc32c(piece).to_le_bytes(), piece].concat()
 }
 
-fn unseal(sealed: &[u8]) -> Result<Bytes> {
+pub(crate) fn unseal(sealed: &[u8]) -> Result<Bytes> {
     let (sum, piece) = sealed.split_at_checked(4).unwrap_or_default();
     let found = crc32c::crc32c(piece);
     if sum != found.to_le_bytes() {
