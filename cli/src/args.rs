@@ -74,6 +74,18 @@ pub(crate) enum Command {
     Fetch(Fetch),
     /// Hold a path against the designed surface: gouges, excess, scallops
     Verify(Verify),
+    /// Show the surface that a path leaves: a mesh with its errors in colour, and a map of them
+    ///
+    /// Rays go out from the spindle; on each the machined surface is where it first meets a cutter, the
+    /// designed one where it last meets a facet of the job's grid. Their difference is told along the
+    /// designed surface's normal. What lies in an undercut is not seen, and nothing is refused: to hold a
+    /// path against the designed surface there is `horma verify`.
+    #[command(after_help = "\
+Example:
+  horma machined target/last/path.csv job.toml -o target/machined
+
+Writes machined.ply (mm, part coordinates, a deviation and a colour at each corner) and machined.svg.")]
+    Machined(Machined),
     /// Serve as a master: workers register, clients submit jobs
     Master(Master),
     /// Serve as a worker of a master
@@ -180,6 +192,31 @@ pub(crate) struct Verify {
     /// Distance between samples of the surface, mm [default: such that there are about 240000]
     #[arg(long, value_name = "MM")]
     pub spacing: Option<f64>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Threads [default: all cores]
+    #[arg(long, value_name = "N", env = "HORMA_THREADS", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Machined {
+    /// The path: the columns of a path.csv; the contact may be empty
+    #[arg(value_name = "PATH.csv")]
+    pub path: PathBuf,
+    /// The job file (TOML): its part, discretization and cutter
+    #[arg(value_name = "JOB")]
+    pub job: PathBuf,
+    /// Directory for machined.ply and machined.svg; created if missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Distance between rays along the spindle, mm
+    #[arg(long, value_name = "MM", default_value_t = 0.5)]
+    pub spacing: f64,
+    /// Rays around the spindle
+    #[arg(long, value_name = "N", default_value_t = 720, value_parser = clap::value_parser!(u32).range(3..=36000))]
+    pub columns: u32,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

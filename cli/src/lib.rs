@@ -11,6 +11,7 @@ mod client;
 mod cluster;
 mod here;
 mod jobs;
+mod machined;
 mod submit;
 mod tls;
 mod verify;
@@ -97,6 +98,7 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Cancel(args) => jobs::cancel(&args),
         Command::Fetch(args) => run::fetch(args),
         Command::Verify(args) => verify::verify(&args),
+        Command::Machined(args) => machined::machined(&args),
         Command::Master(master) => serve::master(&master),
         Command::Worker(worker) => serve::worker(worker),
         Command::Doctor(args) => doctor::doctor(&args),

@@ -11,14 +11,9 @@ use crate::{say, system};
 /// Verifies a path from a file.
 pub(crate) fn verify(args: &args::Verify) -> Result<()> {
     let file = job::read(&args.job, &job::Overrides::default())?;
-    let rows = csv::read(&args.path)?;
-    let positions: Vec<Position> = rows
+    let positions: Vec<Position> = csv::read(&args.path)?
         .iter()
-        .map(|row| Position {
-            x: row.x,
-            angle: row.angle,
-            height: row.height,
-        })
+        .map(csv::Row::position)
         .collect();
     let (part, _) = part::read_all(&file.files)?;
     let part = place(part, file.axis)?;

@@ -221,6 +221,16 @@ pub enum Error {
         /// Most samples.
         limit: f64,
     },
+    /// Too many rays.
+    #[error(
+        "{rays:.3e} rays from the spindle are more than the {limit:.1e} that there can be; ask for a wider spacing"
+    )]
+    TooManyRays {
+        /// Rays that it would take.
+        rays: f64,
+        /// Most rays.
+        limit: f64,
+    },
     /// Stitching found positions that nobody delivered.
     #[error("positions {first} to {last} are missing from the path")]
     Gap {
@@ -281,6 +291,7 @@ impl Error {
                 | Self::ToleranceNotReached { .. }
                 | Self::TooManyPositions { .. }
                 | Self::TooManyInserted { .. }
+                | Self::TooManyRays { .. }
                 | Self::TooManySamples { .. }
                 | Self::GridTooLarge { .. }
                 | Self::EmptyTravel { .. }

@@ -214,7 +214,7 @@ fn verify_body<S: Solid + Copy>(
 }
 
 /// Refuses numbers that are not finite or so far out that they would lose their last digits.
-fn check(positions: &[Position]) -> Result<()> {
+pub(crate) fn check(positions: &[Position]) -> Result<()> {
     let far = "finite and within a kilometre of the origin";
     for (index, p) in positions.iter().enumerate() {
         let numbers = [

@@ -9,7 +9,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use horma_core::{Index, Point, ToolPath, Touch, Waypoint};
+use horma_core::{Index, Point, Position, ToolPath, Touch, Waypoint};
 
 use crate::decimal::integer;
 use crate::error::{Error, Result};
@@ -34,6 +34,17 @@ pub struct Row {
     pub height: Option<f64>,
     /// The touched point in part coordinates, mm; paths from elsewhere may lack it.
     pub contact: Option<Point>,
+}
+
+impl Row {
+    /// What a machine is told of it.
+    pub fn position(&self) -> Position {
+        Position {
+            x: self.x,
+            angle: self.angle,
+            height: self.height,
+        }
+    }
 }
 
 /// Writes `path` to `file`: beside it first, then renamed.

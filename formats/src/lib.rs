@@ -17,7 +17,9 @@ pub mod output;
 
 pub mod csv;
 pub mod gcode;
+pub mod map;
 pub mod plot;
+pub mod ply;
 pub mod preview;
 pub mod report;
 

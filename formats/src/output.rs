@@ -19,6 +19,13 @@ pub const PROGRAM: &str = "path.ngc";
 /// The picture.
 pub const PREVIEW: &str = "preview.png";
 
+/// Every name that a machined surface may give a file of its output directory.
+pub const MACHINED_FILES: [&str; 2] = [MACHINED_MESH, MACHINED_MAP];
+/// The machined surface as triangles.
+pub const MACHINED_MESH: &str = "machined.ply";
+/// Its deviation from the designed one, unrolled.
+pub const MACHINED_MAP: &str = "machined.svg";
+
 /// Every name that a bench of the kernel may give a file of its output directory.
 pub const BENCH_FILES: [&str; 3] = [BENCH_TABLE, BENCH_FIGURES, BENCH_PLOT];
 /// The bench's table.

@@ -1,0 +1,544 @@
+//! Surfaces by rays: how far from the spindle the part is, as designed and as machined.
+//!
+//! A ray goes out from the spindle, square to it. The part as machined ends on it where it first meets a
+//! cutter of the path; the part as designed where it last meets a facet. What lies behind that on the same
+//! ray, an undercut, is not seen. The difference is for maps and pictures, which want one number for each
+//! place; what a path is held against is [`crate::verify()`], which knows of neither rays nor facets.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::cutter::Cutter;
+use crate::digitize::Digitizer;
+use crate::error::{Error, Result, bounded};
+use crate::job::{Contact, Discretization, Job, Method};
+use crate::motion::{Motion, MotionKind, Trajectory};
+use crate::row::Row;
+use crate::simd::Simd;
+use crate::vector::{Interval, Point};
+use crate::verify::{INTERMEDIATE, Position};
+
+/// Rays in rows along the spindle, each row once around: column `j` is where the cutter is when the part
+/// is turned by `360·j/columns` degrees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rays {
+    /// Travel of the first row, mm.
+    pub from: f64,
+    /// Travel from row to row, mm.
+    pub step: f64,
+    /// Number of rows.
+    pub rows: u32,
+    /// Rays of each row.
+    pub columns: u32,
+}
+
+/// Most rays: some 200 MB of what is made of them.
+const MAX_RAYS: f64 = 4.0e6;
+
+/// Radius of the probe that finds the designed surface, mm: so small that it touches next to nothing but
+/// what is on the ray.
+const PROBE: f64 = 1.0e-4;
+
+/// A designed surface and what a path makes of it, ray by ray.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Machined {
+    /// The rays; row after row in what follows.
+    pub rays: Rays,
+    /// Where the designed surface is, mm from the spindle; `None` beyond its ends.
+    pub designed: Vec<Option<f64>>,
+    /// Where the machined surface is, mm from the spindle; `None` where no cutter comes.
+    pub machined: Vec<Option<f64>>,
+    /// How far the machined surface lies outside of the designed one, mm; negative where it was gouged.
+    /// Along the designed surface's normal, to first order: the difference on the ray times the cosine of
+    /// its angle with the normal. `None` where one of the two is missing.
+    pub deviation: Vec<Option<f64>>,
+}
+
+/// A place of a machined surface.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spot {
+    /// How far it lies outside of the designed surface, mm; negative where it was gouged.
+    pub deviation: f64,
+    /// In part coordinates, mm.
+    pub point: Point,
+    /// Travel at which it faces the cutter, mm.
+    pub x: f64,
+    /// Angle at which it does, degrees, within one revolution.
+    pub angle: f64,
+}
+
+impl Machined {
+    /// The place of the least deviation: the deepest gouge, if that is negative. Of equal ones the first.
+    pub fn deepest(&self) -> Option<Spot> {
+        self.extreme(|a, b| a < b)
+    }
+
+    /// The place of the greatest deviation.
+    pub fn highest(&self) -> Option<Spot> {
+        self.extreme(|a, b| a > b)
+    }
+
+    fn extreme(&self, beyond: impl Fn(f64, f64) -> bool) -> Option<Spot> {
+        let mut found: Option<(usize, f64)> = None;
+        for (ray, deviation) in self.deviation.iter().enumerate() {
+            if let Some(deviation) = *deviation
+                && found.is_none_or(|(_, so_far)| beyond(deviation, so_far))
+            {
+                found = Some((ray, deviation));
+            }
+        }
+        let (ray, deviation) = found?;
+        let [x, angle] = self.rays.position(ray);
+        Some(Spot {
+            deviation,
+            point: self.rays.point(ray, self.machined[ray]?),
+            x,
+            angle,
+        })
+    }
+}
+
+impl Rays {
+    /// Rays over a part that extends over `part` along the spindle, about `spacing` mm apart along it, and
+    /// `columns` around it.
+    ///
+    /// # Errors
+    /// [`Error::OutOfBounds`] for a spacing that is not positive, [`Error::TooManyRays`].
+    pub fn over(part: Interval, spacing: f64, columns: u32) -> Result<Self> {
+        let ok = spacing > 0.0 && spacing.is_finite();
+        bounded("spacing", spacing, ok, "greater than 0 mm and finite")?;
+        let steps = ((part.high - part.low).max(0.0) / spacing).ceil().max(1.0);
+        let rays = steps * f64::from(columns);
+        if rays > MAX_RAYS {
+            return Err(Error::TooManyRays {
+                rays,
+                limit: MAX_RAYS,
+            });
+        }
+        // In the middle of their strips, so that none is at the very end.
+        let step = (part.high - part.low) / steps;
+        Ok(Self {
+            from: part.low + step / 2.0,
+            step,
+            rows: steps as u32,
+            columns,
+        })
+    }
+
+    /// Number of rays.
+    pub fn len(&self) -> usize {
+        self.rows as usize * self.columns as usize
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The point on a ray at a distance from the spindle, in part coordinates, mm.
+    pub fn point(&self, ray: usize, radius: f64) -> Point {
+        let rings = self.rings();
+        let (cos, sin) = rings.direction_at(ray as u64, 0.0);
+        [rings.travel(ray as u64), radius * cos, -radius * sin]
+    }
+
+    /// Travel, mm, and angle, degrees, at which a ray faces the cutter.
+    pub fn position(&self, ray: usize) -> [f64; 2] {
+        let angle = 360.0 * (ray % self.columns as usize) as f64 / f64::from(self.columns);
+        [self.rings().travel(ray as u64), angle]
+    }
+
+    /// The motion that turns each of them to the cutter.
+    fn rings(&self) -> Trajectory {
+        Trajectory {
+            kind: MotionKind::Rings,
+            from: self.from,
+            step: self.step,
+            points_per_revolution: self.columns,
+            positions: self.len() as u64,
+        }
+    }
+}
+
+/// What a path of `cutter` makes of the part whose rows these are. The cutter moves straight from each
+/// position to the next; of each move some poses count. Runs on the current thread pool.
+///
+/// # Errors
+/// Those of [`crate::verify()`] for positions.
+pub fn machined(
+    rows: &[Row],
+    cutter: &Cutter,
+    positions: &[Position],
+    rays: Rays,
+    simd: Simd,
+) -> Result<Machined> {
+    crate::verify::check(positions)?;
+    let designed = designed(rows, &rays, simd)?;
+    let machined = cut(cutter, positions, &rays);
+    let slant = slants(&rays, &designed);
+    let both = designed.iter().zip(&machined).zip(slant);
+    let deviation = both
+        .map(|((d, m), slant)| Some(((*m)? - (*d)?) * slant))
+        .collect();
+    Ok(Machined {
+        rays,
+        designed,
+        machined,
+        deviation,
+    })
+}
+
+/// Where each ray last meets a facet: what a probe touches that comes in along it.
+fn designed(rows: &[Row], rays: &Rays, simd: Simd) -> Result<Vec<Option<f64>>> {
+    let probe = Job {
+        // Already done.
+        discretization: Discretization::Tolerance(PROBE),
+        cutter: Cutter::ball(PROBE)?,
+        motion: Motion {
+            kind: MotionKind::Rings,
+            step: rays.step,
+            points_per_revolution: rays.columns,
+            from: None,
+            to: None,
+            path_tolerance: None,
+        },
+        contact: Contact::Facet,
+        method: Method::Exact,
+    };
+    let mut radii = Vec::with_capacity(rays.len());
+    Digitizer::new(&probe, rows, simd).run_chunks(
+        &rays.rings(),
+        0..rays.len() as u64,
+        |chunk, _| {
+            // On the far side of the spindle there is another ray.
+            let radius = |t: crate::path::Touch| (t.height > PROBE).then(|| across(t.contact));
+            radii.extend(
+                chunk
+                    .touches
+                    .into_iter()
+                    .map(|touch| touch.and_then(radius)),
+            );
+            true
+        },
+    );
+    Ok(radii)
+}
+
+fn across(p: Point) -> f64 {
+    (p[1] * p[1] + p[2] * p[2]).sqrt()
+}
+
+/// Cosines of the angles between rays and the surface's normal, from differences to the rays beside them.
+fn slants(rays: &Rays, radii: &[Option<f64>]) -> Vec<f64> {
+    let columns = rays.columns as usize;
+    let turn = std::f64::consts::TAU / f64::from(rays.columns);
+    let slope = |here: f64, beside: [Option<usize>; 2], apart: f64| {
+        let [before, after] = beside.map(|ray| ray.and_then(|ray| radii[ray]));
+        let sides = f64::from(u8::from(before.is_some()) + u8::from(after.is_some()));
+        (after.unwrap_or(here) - before.unwrap_or(here)) / (sides.max(1.0) * apart)
+    };
+    let slant = |ray: usize, here: f64| {
+        let (first, column) = (ray - ray % columns, ray % columns);
+        let next = Some(ray + columns).filter(|&ray| ray < radii.len());
+        let along = slope(here, [ray.checked_sub(columns), next], rays.step);
+        let around = [column + columns - 1, column + 1].map(|to| Some(first + to % columns));
+        let about = slope(here, around, turn * here);
+        1.0 / (1.0 + along * along + about * about).sqrt()
+    };
+    let radii = radii.iter().enumerate();
+    radii
+        .map(|(ray, radius)| radius.map_or(1.0, |here| slant(ray, here)))
+        .collect()
+}
+
+/// A cutter where it stands, as the part sees it.
+#[derive(Debug, Clone, Copy)]
+struct Stand {
+    x: f64,
+    /// From the spindle, mm, never negative.
+    height: f64,
+    cos: f64,
+    sin: f64,
+}
+
+/// Cutters by the direction from which they come, each lot in order of travel.
+struct Lot {
+    stands: Vec<Stand>,
+    /// The lowest of them, mm.
+    low: f64,
+}
+
+/// Lots of a revolution.
+const LOTS: usize = 360;
+
+/// Where each ray first meets a cutter.
+fn cut(cutter: &Cutter, positions: &[Position], rays: &Rays) -> Vec<Option<f64>> {
+    let lots = lots(positions);
+    let directions = rays.rings().directions();
+    let (width, most) = (cutter.half_width(), cutter.max_radius());
+    let low = lots.iter().map(|lot| lot.low).fold(f64::INFINITY, f64::min);
+    // Seen from the spindle, a cutter is as wide as this at most; one on the spindle is everywhere.
+    let wide = if low > most {
+        (most / low).asin()
+    } else {
+        std::f64::consts::PI
+    };
+    let turn = std::f64::consts::TAU / LOTS as f64;
+    let reach = ((wide / turn).ceil() as usize + 1).min(LOTS / 2);
+    let row = |row: u32| {
+        let x = rays.from + rays.step * f64::from(row);
+        let near: Vec<&[Stand]> = lots
+            .iter()
+            .map(|lot| {
+                let from = lot.stands.partition_point(|s| s.x < x - width);
+                let to = lot.stands.partition_point(|s| s.x <= x + width);
+                &lot.stands[from..to]
+            })
+            .collect();
+        let ray = |(column, &direction): (usize, &(f64, f64))| {
+            let home = column * LOTS / directions.len();
+            let mut first = f64::INFINITY;
+            for away in 0..=reach {
+                let sides = [home + away, home + LOTS - away];
+                for side in &sides[..if away == 0 { 1 } else { 2 }] {
+                    let lot = side % LOTS;
+                    if lots[lot].low - most < first {
+                        first = first_met(cutter, most, near[lot], x, direction, first);
+                    }
+                }
+            }
+            first.is_finite().then_some(first)
+        };
+        directions.iter().enumerate().map(ray).collect::<Vec<_>>()
+    };
+    let rows: Vec<_> = (0..rays.rows).into_par_iter().map(row).collect();
+    rows.concat()
+}
+
+/// All poses of a path, by direction and travel.
+fn lots(positions: &[Position]) -> Vec<Lot> {
+    let mut lots: Vec<Lot> = (0..LOTS)
+        .map(|_| Lot {
+            stands: Vec::new(),
+            low: f64::INFINITY,
+        })
+        .collect();
+    let mut add = |x: f64, angle: f64, height: f64| {
+        // From below the spindle is from above on the other side.
+        let angle = if height < 0.0 { angle + 180.0 } else { angle };
+        let degrees = angle.rem_euclid(360.0);
+        let radians = degrees.to_radians();
+        let lot = &mut lots[((degrees / 360.0 * LOTS as f64) as usize).min(LOTS - 1)];
+        lot.low = lot.low.min(height.abs());
+        lot.stands.push(Stand {
+            x,
+            height: height.abs(),
+            cos: libm::cos(radians),
+            sin: libm::sin(radians),
+        });
+    };
+    for (k, p) in positions.iter().enumerate() {
+        let Some(height) = p.height else { continue };
+        add(p.x, p.angle, height);
+        let next = positions
+            .get(k + 1)
+            .and_then(|n| Some((n.x, n.angle, n.height?)));
+        let Some((x, angle, then)) = next else {
+            continue;
+        };
+        for pose in 1..=INTERMEDIATE {
+            let share = pose as f64 / (INTERMEDIATE + 1) as f64;
+            let between = |a: f64, b: f64| a + (b - a) * share;
+            add(
+                between(p.x, x),
+                between(p.angle, angle),
+                between(height, then),
+            );
+        }
+    }
+    for lot in &mut lots {
+        lot.stands.sort_by(|a, b| a.x.total_cmp(&b.x));
+    }
+    lots
+}
+
+/// The lesser of `first` and where a ray first meets one of these cutters, which are `most` mm in radius.
+fn first_met(
+    cutter: &Cutter,
+    most: f64,
+    stands: &[Stand],
+    x: f64,
+    (cos, sin): (f64, f64),
+    mut first: f64,
+) -> f64 {
+    for stand in stands {
+        // The tool centre along the ray and square to it.
+        let along = stand.height * (stand.cos * cos + stand.sin * sin);
+        if along - most >= first {
+            continue;
+        }
+        let aside = stand.height * (stand.sin * cos - stand.cos * sin);
+        let Some(m) = cutter.profile(x - stand.x) else {
+            continue;
+        };
+        if stand.height <= m {
+            // It is in the spindle's way: nothing is left.
+            return 0.0;
+        }
+        if along > 0.0 && aside.abs() <= m {
+            first = first.min(along - ((m - aside) * (m + aside)).sqrt());
+        }
+    }
+    first
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::discretize::discretize;
+    use crate::part::{Body, Mesh, Part, Shape};
+    use proptest::prelude::*;
+
+    /// A round bar along the spindle as a mesh.
+    fn bar(radius: f64, long: f64, around: u32) -> Vec<Row> {
+        let mut vertices = Vec::new();
+        for end in [0.0, long] {
+            for k in 0..around {
+                let angle = std::f64::consts::TAU * f64::from(k) / f64::from(around);
+                vertices.push([end, radius * angle.cos(), radius * angle.sin()]);
+            }
+        }
+        let triangles = (0..around).flat_map(|k| {
+            let (a, b) = (k, (k + 1) % around);
+            [[a, b, around + a], [b, around + b, around + a]]
+        });
+        let mesh = Mesh::new("bar", vertices, triangles.collect()).expect("valid");
+        let bodies = vec![Body {
+            name: "bar".to_owned(),
+            shape: Shape::Mesh(mesh),
+        }];
+        let model = discretize(&Part { bodies }, Discretization::Tolerance(0.1));
+        model.expect("a model").rows
+    }
+
+    fn helix(height: impl Fn(usize) -> f64, count: usize) -> Vec<Position> {
+        let position = |i: usize| Position {
+            x: 0.01 * i as f64,
+            angle: 2.0 * i as f64,
+            height: Some(height(i)),
+        };
+        (0..count).map(position).collect()
+    }
+
+    /// A bar of 20 mm, turned by a wheel of 48 that stops 0.03 mm away from it: round and 0.03 too thick,
+    /// but for where one position is half a millimetre too low.
+    #[test]
+    fn what_one_low_position_does_is_seen_where_it_was() {
+        let rows = bar(20.0, 40.0, 720);
+        let cutter = Cutter::torus(40.0, 8.0).expect("valid");
+        let low = 2000;
+        let path = helix(|i| 68.03 - if i == low { 0.53 } else { 0.0 }, 4001);
+        let rays = Rays::over(
+            Interval {
+                low: 0.0,
+                high: 40.0,
+            },
+            0.25,
+            360,
+        )
+        .expect("few");
+        let found = machined(&rows, &cutter, &path, rays, Simd::best()).expect("valid");
+        let deepest = found.deepest().expect("some");
+        assert!((deepest.x - path[low].x).abs() <= rays.step, "{deepest:?}");
+        assert_eq!(deepest.angle, path[low].angle % 360.0);
+        assert!((deepest.deviation + 0.5).abs() < 0.002, "{deepest:?}");
+        // A revolution further the cutter has moved on by 1.8 mm.
+        let turned = found
+            .deviation
+            .iter()
+            .filter(|d| d.is_some_and(|d| d > 0.0))
+            .count();
+        assert!(turned > rays.len() * 9 / 10, "{turned} of {}", rays.len());
+        // Of 1.8 mm from revolution to revolution a scallop of 0.05 mm is left, at the ends up to 0.2 mm.
+        let highest = found.highest().expect("some");
+        assert!(highest.deviation < 0.03 + 0.21, "{highest:?}");
+    }
+
+    #[test]
+    fn a_cutter_on_the_spindle_leaves_nothing() {
+        let cutter = Cutter::torus(40.0, 8.0).expect("valid");
+        let rays = Rays::over(
+            Interval {
+                low: 0.0,
+                high: 20.0,
+            },
+            1.0,
+            12,
+        )
+        .expect("few");
+        let path = [Position {
+            x: 10.0,
+            angle: 30.0,
+            height: Some(10.0),
+        }];
+        let found = cut(&cutter, &path, &rays);
+        let under = |ray: usize| (rays.position(ray)[0] - 10.0).abs() <= 8.0;
+        for (ray, radius) in found.iter().enumerate() {
+            assert_eq!(*radius, under(ray).then_some(0.0));
+        }
+    }
+
+    #[test]
+    fn rays_are_bounded() {
+        let long = Interval {
+            low: 0.0,
+            high: 1.0e6,
+        };
+        assert!(matches!(
+            Rays::over(long, 0.001, 360),
+            Err(Error::TooManyRays { .. })
+        ));
+        assert!(Rays::over(long, f64::NAN, 360).is_err());
+    }
+
+    proptest! {
+        /// Against sampling along the ray: up to what was found there is no cutter, and there is one's surface.
+        #[test]
+        fn a_ray_ends_where_it_first_meets_a_cutter(
+            stands in prop::collection::vec((0.0..30.0_f64, -720.0..720.0_f64, 50.0..90.0_f64), 1..12),
+            which in 0..3_usize,
+        ) {
+            let cutter = [
+                Cutter::torus(40.0, 8.0),
+                Cutter::cylinder(30.0, 16.0),
+                Cutter::cone(30.0, 20.0, 30.0),
+            ][which].clone().expect("valid");
+            // Each alone: no moves.
+            let path: Vec<Position> = stands
+                .iter()
+                .flat_map(|&(x, angle, height)| [Some(height), None].map(|height| Position { x, angle, height }))
+                .collect();
+            let rays = Rays::over(Interval { low: 0.0, high: 30.0 }, 5.0, 18).expect("few");
+            // How deep in the nearest cutter, mm; negative outside of all.
+            let depth = |p: Point| {
+                let within = stands.iter().filter_map(|&(x, angle, height)| {
+                    let (sin, cos) = angle.to_radians().sin_cos();
+                    let (y, z) = (p[1] * cos - p[2] * sin, p[1] * sin + p[2] * cos);
+                    cutter.profile(p[0] - x).map(|m| m - (y - height).hypot(z))
+                });
+                within.fold(f64::NEG_INFINITY, f64::max)
+            };
+            for (ray, radius) in cut(&cutter, &path, &rays).into_iter().enumerate() {
+                let free = radius.unwrap_or(150.0);
+                for k in 0..200 {
+                    let at = free * f64::from(k) / 200.0;
+                    prop_assert!(depth(rays.point(ray, at)) <= 1.0e-9, "{at} of {free}");
+                }
+                if let Some(radius) = radius {
+                    let met = depth(rays.point(ray, radius));
+                    prop_assert!(met.abs() <= 1.0e-6, "{met}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,267 @@
+//! `machined.svg`: the deviation of the machined surface from the designed one, unrolled: travel from left
+//! to right, the angle at which each place faces the cutter from bottom to top.
+//!
+//! A pixel is a ray; nothing is smoothed. The picture brings its own scale of colours.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use horma_core::Machined;
+
+use crate::error::Result;
+use crate::output;
+
+/// Colours for deviations: blue where gouged, white where nothing is the matter, orange where material is
+/// left; the end of the scale and beyond is full colour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// Deviation at which the colour is full, mm.
+    pub end: f64,
+}
+
+/// Full colours of gouge and excess, and what lies between.
+const GOUGE: [f64; 3] = [5.0, 48.0, 140.0];
+const NOTHING: [f64; 3] = [247.0, 247.0, 247.0];
+const EXCESS: [f64; 3] = [196.0, 78.0, 10.0];
+/// Where nothing is measured.
+const MISSING: [u8; 3] = [208, 215, 222];
+
+/// Share of the excesses that the scale holds: some places are out of the cutter's reach, and would take
+/// all colour from the rest.
+const HELD: f64 = 0.95;
+/// Shortest scale, mm: below that all is well, and white.
+const SHORTEST: f64 = 1.0e-3;
+
+impl Scale {
+    /// One that holds every gouge, and all excesses but a few.
+    pub fn of(surface: &Machined) -> Self {
+        let mut excesses: Vec<f64> = surface.deviation.iter().flatten().copied().collect();
+        excesses.sort_unstable_by(f64::total_cmp);
+        let deepest = excesses.first().map_or(0.0, |least| -least);
+        let held = (HELD * excesses.len() as f64) as usize;
+        let high = excesses.get(held).copied().unwrap_or(0.0);
+        Self {
+            end: deepest.max(high).max(SHORTEST),
+        }
+    }
+
+    /// The colour of a deviation.
+    pub fn colour(&self, deviation: Option<f64>) -> [u8; 3] {
+        let Some(deviation) = deviation else {
+            return MISSING;
+        };
+        let full = if deviation < 0.0 { GOUGE } else { EXCESS };
+        let share = (deviation.abs() / self.end).min(1.0);
+        std::array::from_fn(|k| (NOTHING[k] + (full[k] - NOTHING[k]) * share).round() as u8)
+    }
+}
+
+/// Size of the picture, and the frame in it: left, top, right, bottom.
+const SIZE: [f64; 2] = [960.0, 560.0];
+const FRAME: [f64; 4] = [64.0, 84.0, 936.0, 460.0];
+/// Left, top, right and bottom of the scale of colours.
+const BAR: [f64; 4] = [300.0, 524.0, 700.0, 536.0];
+
+const STYLE: &str = "\
+text{font-family:system-ui,sans-serif;font-size:13px;fill:#24292f}\
+.title{font-size:17px;font-weight:600}.minor{fill:#57606a}\
+.paper{fill:#ffffff}.frame{stroke:#57606a;fill:none}.tick{stroke:#57606a}\
+image{image-rendering:pixelated}\
+@media (prefers-color-scheme:dark){\
+text{fill:#e6edf3}.minor{fill:#9da7b3}.paper{fill:#0d1117}.frame,.tick{stroke:#9da7b3}}";
+
+/// Writes the map to `file`: beside it first, then renamed.
+///
+/// # Errors
+/// [`crate::Error::Io`] if the file cannot be written.
+pub fn save(file: &Path, surface: &Machined) -> Result<()> {
+    let svg = svg(surface);
+    output::write(file, |out| out.write_all(svg.as_bytes()))
+}
+
+fn svg(surface: &Machined) -> String {
+    let [width, height] = SIZE;
+    let [left, top, right, bottom] = FRAME;
+    let scale = Scale::of(surface);
+    let rays = &surface.rays;
+    let mut out = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
+         width=\"{width}\" height=\"{height}\" role=\"img\">\n\
+         <title>Deviation of the machined surface</title>\n<style>{STYLE}</style>\n\
+         <rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\n"
+    );
+    let mut text = |class: &str, anchor: &str, x: f64, y: f64, content: &str| {
+        let _ = writeln!(
+            out,
+            "<text class=\"{class}\" text-anchor=\"{anchor}\" x=\"{x:.1}\" y=\"{y:.1}\">{content}</text>"
+        );
+    };
+    text(
+        "title",
+        "start",
+        left,
+        32.0,
+        "Deviation of the machined surface",
+    );
+    let subtitle = format!(
+        "mm along the normal of the designed surface, on {} by {} rays from the spindle; grey where there is none",
+        rays.rows, rays.columns
+    );
+    text("minor", "start", left, 54.0, &subtitle);
+    let (low, high) = (
+        rays.from - rays.step / 2.0,
+        rays.from + rays.step * (f64::from(rays.rows) - 0.5),
+    );
+    let mut ticks = String::new();
+    for travel in ticks_between(low, high) {
+        let x = left + (right - left) * (travel - low) / (high - low);
+        text("minor", "middle", x, bottom + 20.0, &format!("{travel}"));
+        let _ = writeln!(ticks, "<path class=\"tick\" d=\"M{x:.1} {bottom}v5\"/>");
+    }
+    for angle in [0, 90, 180, 270, 360] {
+        let y = bottom - (bottom - top) * f64::from(angle) / 360.0;
+        text("minor", "end", left - 9.0, y + 4.5, &format!("{angle}°"));
+        let _ = writeln!(ticks, "<path class=\"tick\" d=\"M{left} {y:.1}h-5\"/>");
+    }
+    text(
+        "",
+        "middle",
+        (left + right) / 2.0,
+        bottom + 42.0,
+        "travel, mm",
+    );
+    let [bar_left, bar_top, bar_right, bar_bottom] = BAR;
+    let end = scale.end;
+    for (share, anchor) in [(-1.0, "start"), (0.0, "middle"), (1.0, "end")] {
+        let x = (bar_left + bar_right) / 2.0 + share * (bar_right - bar_left) / 2.0;
+        text(
+            "minor",
+            anchor,
+            x,
+            bar_bottom + 16.0,
+            &format!("{:.3}", share * end),
+        );
+    }
+    text("minor", "end", bar_left - 10.0, bar_bottom, "gouge");
+    text("minor", "start", bar_right + 10.0, bar_bottom, "excess");
+    out.push_str(&ticks);
+    let picture = png(rays.rows, rays.columns, |x, y| {
+        // The last column on top.
+        let column = (rays.columns - 1 - y) as usize;
+        let ray = x as usize * rays.columns as usize + column;
+        scale.colour(surface.deviation[ray])
+    });
+    image(&mut out, FRAME, &picture);
+    let steps = 256;
+    let bar = png(steps, 1, |x, _| {
+        scale.colour(Some(
+            end * (2.0 * f64::from(x) / f64::from(steps - 1) - 1.0),
+        ))
+    });
+    image(&mut out, BAR, &bar);
+    out.push_str("</svg>\n");
+    out
+}
+
+/// A picture stretched over a frame, with a line around it.
+fn image(out: &mut String, [left, top, right, bottom]: [f64; 4], png: &[u8]) {
+    let (wide, high) = (right - left, bottom - top);
+    let _ = writeln!(
+        out,
+        "<image x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\" preserveAspectRatio=\"none\" \
+         href=\"data:image/png;base64,{}\"/>\n\
+         <rect class=\"frame\" x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\"/>",
+        STANDARD.encode(png)
+    );
+}
+
+fn png(columns: u32, rows: u32, colour: impl Fn(u32, u32) -> [u8; 3]) -> Vec<u8> {
+    let pixels = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
+    let pixels: Vec<[u8; 3]> = pixels.map(|(x, y)| colour(x, y)).collect();
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, columns, rows);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder
+        .write_header()
+        .and_then(|mut writer| writer.write_image_data(pixels.as_flattened()))
+        .expect("a picture of this size can be encoded in memory");
+    file
+}
+
+/// A few round numbers in an interval.
+fn ticks_between(low: f64, high: f64) -> Vec<f64> {
+    let rough = (high - low) / 8.0;
+    let decade = 10.0_f64.powf(rough.log10().floor());
+    let round = [1.0, 2.0, 5.0, 10.0].map(|k| k * decade);
+    let step = round.into_iter().find(|&s| s >= rough).unwrap_or(rough);
+    let first = (low / step).ceil() as i64;
+    let last = (high / step).floor() as i64;
+    // Back and forth, so that 0.3 does not show as 0.30000000000000004.
+    let tick = |k: i64| (k as f64 * step * 1.0e9).round() / 1.0e9;
+    (first..=last).map(tick).collect()
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use horma_core::Rays;
+
+    /// A ring of 3 rows and 8 columns, 10 mm from the spindle: one ray is gouged by half a millimetre,
+    /// one meets nothing.
+    pub(crate) fn surface() -> Machined {
+        let rays = Rays {
+            from: 0.5,
+            step: 1.0,
+            rows: 3,
+            columns: 8,
+        };
+        let mut machined = vec![Some(10.0); rays.len()];
+        machined[9] = Some(9.5);
+        machined[23] = None;
+        let deviation = machined.iter().map(|m| m.map(|m: f64| m - 10.0)).collect();
+        Machined {
+            rays,
+            designed: vec![Some(10.0); rays.len()],
+            machined,
+            deviation,
+        }
+    }
+
+    #[test]
+    fn a_gouge_is_blue_where_it_is() {
+        let surface = surface();
+        let scale = Scale::of(&surface);
+        assert_eq!(scale.end, 0.5);
+        assert_eq!(scale.colour(surface.deviation[9]), [5, 48, 140]);
+        assert_eq!(scale.colour(surface.deviation[0]), [247, 247, 247]);
+        assert_eq!(scale.colour(surface.deviation[23]), MISSING);
+        let svg = svg(&surface);
+        let start = svg.find("base64,").expect("a picture") + 7;
+        let length = svg[start..].find('"').expect("its end");
+        let png = STANDARD
+            .decode(&svg[start..start + length])
+            .expect("base 64");
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png))
+            .read_info()
+            .expect("PNG");
+        let mut pixels = vec![0; reader.output_buffer_size().expect("small")];
+        reader.next_frame(&mut pixels).expect("a picture");
+        // Row 1 from the left, column 1 from below.
+        let pixel = |x: usize, y: usize| &pixels[3 * (y * 3 + x)..][..3];
+        assert_eq!(pixel(1, 6), [5, 48, 140]);
+        assert_eq!(pixel(2, 0), MISSING);
+        assert_eq!(pixels.iter().filter(|&&p| p == 247).count(), 3 * 22);
+    }
+
+    #[test]
+    fn ticks_are_round_and_few() {
+        assert_eq!(ticks_between(-3.0, 247.0), [0.0, 50.0, 100.0, 150.0, 200.0]);
+        assert_eq!(
+            ticks_between(0.0, 0.8),
+            [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]
+        );
+    }
+}
