@@ -177,6 +177,3 @@ impl std::fmt::Display for Spot {
         write!(f, "travel {:.3}, angle {:.2}°", self.x, self.angle)
     }
 }
-
-#[cfg(test)]
-mod tests;

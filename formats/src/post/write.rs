@@ -187,7 +187,7 @@ impl Script<'_> {
                 "{x}: travel along the spindle axis{}; {y}: attack axis, to {point}{}; {a}: turn of the part about {x}, {}",
                 reversed(TRAVEL),
                 reversed(ATTACK),
-                if words[ROTATION].negative {
+                if words[TRAVEL].negative != words[ROTATION].negative {
                     "left-handed"
                 } else {
                     "right-handed"
