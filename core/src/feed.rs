@@ -108,7 +108,7 @@ pub fn timing(stations: &[Station], limits: &Limits) -> Timing {
         .windows(2)
         .map(|w| Square::alone(&w[0], &w[1], limits))
         .collect();
-    let mut shares = vec![1.0; moves.len() + 1];
+    let mut shares = vec![Share::WHOLE; moves.len() + 1];
     let mut timing = looking_ahead(&moves, alone.clone(), limits, &shares);
     if limits.axes.iter().all(|a| a.jerk.is_infinite()) {
         return timing;
@@ -131,25 +131,25 @@ fn looking_ahead(
     moves: &[[f64; 3]],
     mut squares: Vec<Square>,
     limits: &Limits,
-    shares: &[f64],
+    shares: &[Share],
 ) -> Timing {
     rest(moves, &mut squares, limits, shares);
     let joints = || moves.windows(2).zip(&shares[1..]).enumerate();
     for (i, (joint, share)) in joints() {
         for axis in MachineAxis::ALL {
             let turning = curvature(joint, axis).abs();
-            let (limit, bound) = limits.acceleration(axis, *share);
+            let (limit, bound) = limits.acceleration(axis, share);
             squares[i].lower(limit / turning, bound);
             squares[i + 1].lower(limit / turning, bound);
         }
     }
     for (i, (joint, share)) in joints() {
         let neighbour = squares[i].value;
-        squares[i + 1].after(neighbour, joint, limits, *share);
+        squares[i + 1].after(neighbour, joint, limits, share);
     }
     for i in (1..moves.len()).rev() {
         let neighbour = squares[i].value;
-        squares[i - 1].after(neighbour, &moves[i - 1..=i], limits, shares[i]);
+        squares[i - 1].after(neighbour, &moves[i - 1..=i], limits, &shares[i]);
     }
     Timing {
         durations: squares.iter().map(|s| 1.0 / s.value.sqrt()).collect(),
@@ -157,24 +157,43 @@ fn looking_ahead(
     }
 }
 
+/// How much of the accelerations a joint may have, and on whose account it is no more.
+#[derive(Debug, Clone, Copy)]
+struct Share {
+    value: f64,
+    jerk_of: Option<MachineAxis>,
+}
+
+impl Share {
+    const WHOLE: Self = Self {
+        value: 1.0,
+        jerk_of: None,
+    };
+}
+
 /// Lowers the shares of the joints at both ends of each move with too much jerk; how many times its limit
 /// the worst is.
-fn cut_down(shares: &mut [f64], moves: &[[f64; 3]], durations: &[f64], limits: &Limits) -> f64 {
+fn cut_down(shares: &mut [Share], moves: &[[f64; 3]], durations: &[f64], limits: &Limits) -> f64 {
     let mut worst: f64 = 0.0;
-    let mut cut = vec![1.0_f64; shares.len()];
+    let mut cuts = vec![Share::WHOLE; shares.len()];
     for axis in MachineAxis::ALL {
         let at = accelerations(moves, durations, axis);
         let limit = limits.axes[axis as usize].jerk;
         for (i, (ends, duration)) in at.windows(2).zip(durations).enumerate() {
             let ratio = (ends[1] - ends[0]).abs() / duration / limit;
             worst = worst.max(ratio);
-            for cut in &mut cut[i..i + 2] {
-                *cut = cut.min((1.0 / ratio).max(LEAST_SHARE));
+            let value = (1.0 / ratio).max(LEAST_SHARE);
+            for cut in cuts[i..i + 2].iter_mut().filter(|c| value < c.value) {
+                *cut = Share {
+                    value,
+                    jerk_of: Some(axis),
+                };
             }
         }
     }
-    for (share, cut) in shares.iter_mut().zip(cut) {
-        *share *= cut;
+    for (share, cut) in shares.iter_mut().zip(cuts) {
+        share.value *= cut.value;
+        share.jerk_of = cut.jerk_of.or(share.jerk_of);
     }
     worst
 }
@@ -209,7 +228,7 @@ impl Square {
     }
 
     /// No more than what the neighbour across `joint`, if it is slower, allows.
-    fn after(&mut self, neighbour: f64, joint: &[[f64; 3]], limits: &Limits, share: f64) {
+    fn after(&mut self, neighbour: f64, joint: &[[f64; 3]], limits: &Limits, share: &Share) {
         for axis in MachineAxis::ALL {
             let (limit, bound) = limits.acceleration(axis, share);
             let half = 0.25 * (joint[0][axis as usize] + joint[1][axis as usize]).abs();
@@ -221,13 +240,9 @@ impl Square {
 
 impl Limits {
     /// The acceleration of an axis at a joint with this share of it, and what to call it.
-    fn acceleration(&self, axis: MachineAxis, share: f64) -> (f64, Bound) {
-        let bound = if share < 1.0 {
-            Bound::Jerk(axis)
-        } else {
-            Bound::Acceleration(axis)
-        };
-        (share * self.axes[axis as usize].acceleration, bound)
+    fn acceleration(&self, axis: MachineAxis, share: &Share) -> (f64, Bound) {
+        let bound = share.jerk_of.map_or(Bound::Acceleration(axis), Bound::Jerk);
+        (share.value * self.axes[axis as usize].acceleration, bound)
     }
 }
 
@@ -237,14 +252,14 @@ fn curvature(joint: &[[f64; 3]], axis: MachineAxis) -> f64 {
 }
 
 /// The first move begins, and the last ends, at rest: the whole velocity over half the duration.
-fn rest(moves: &[[f64; 3]], squares: &mut [Square], limits: &Limits, shares: &[f64]) {
+fn rest(moves: &[[f64; 3]], squares: &mut [Square], limits: &Limits, shares: &[Share]) {
     let last = moves.len().saturating_sub(1);
     for (i, joint) in [(0, 0), (last, moves.len())] {
         let (Some(way), Some(square)) = (moves.get(i), squares.get_mut(i)) else {
             continue;
         };
         for axis in MachineAxis::ALL {
-            let (limit, bound) = limits.acceleration(axis, shares[joint]);
+            let (limit, bound) = limits.acceleration(axis, &shares[joint]);
             square.lower(limit / (2.0 * way[axis as usize].abs()), bound);
         }
     }

@@ -144,6 +144,10 @@ fn jerk_is_kept_where_it_is_given() {
     let seconds = |t: &Timing| t.durations.iter().sum::<f64>();
     let ratio = seconds(&slow) / seconds(&quick);
     assert!(ratio > 1.0 && ratio < 2.0, "{ratio}");
+    let jerk = |b: &&Bound| matches!(b, Bound::Jerk(_));
+    let mut jerks = slow.bounds.iter().filter(jerk).peekable();
+    assert!(jerks.peek().is_some());
+    assert!(jerks.all(|b| *b == Bound::Jerk(MachineAxis::Attack)));
 }
 
 #[test]

@@ -112,7 +112,7 @@ pub struct Modulo {
 pub enum Direction {
     /// It takes the shorter way.
     Shorter,
-    /// The sign of the number.
+    /// The sign of the number, also of 0.
     Sign,
     /// A function around the number, for either direction.
     Function([&'static str; 2]),

@@ -54,7 +54,7 @@ impl Lines {
         self.called(letter, "", increments, decimals, "");
     }
 
-    /// A word with a function around its number.
+    /// A word with something around its number: a sign, a function.
     pub(super) fn called(
         &mut self,
         letter: char,
@@ -129,7 +129,7 @@ impl Lines {
         match c {
             '(' => b'[',
             ')' => b']',
-            ';' if plain => b',',
+            ';' => b',',
             ':' if plain => b'=',
             '"' | '\'' if plain => b' ',
             ' '..='~' if plain => c.to_ascii_uppercase() as u8,

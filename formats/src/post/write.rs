@@ -274,21 +274,17 @@ impl Script<'_> {
         };
         let (turn, word) = (self.turn_of(), self.program.words[ROTATION]);
         let within = rotation.rem_euclid(turn);
+        let decimals = self.program.decimals[ROTATION];
         match modulo.direction {
             Direction::Shorter => self.word(lines, ROTATION, within),
-            // There is no negative 0.
-            Direction::Sign if word.negative && within == 0 => self.word(lines, ROTATION, -turn),
-            Direction::Sign if word.negative => self.word(lines, ROTATION, -within),
+            // Also of 0: hence not the number's own.
+            Direction::Sign if word.negative => {
+                lines.called(word.letter, "-", within, decimals, "");
+            }
             Direction::Sign => self.word(lines, ROTATION, within),
             Direction::Function(open) => {
                 let open = open[usize::from(word.negative)];
-                lines.called(
-                    word.letter,
-                    open,
-                    within,
-                    self.program.decimals[ROTATION],
-                    ")",
-                );
+                lines.called(word.letter, open, within, decimals, ")");
             }
         }
     }
