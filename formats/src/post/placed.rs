@@ -100,7 +100,7 @@ impl Placed {
         Err(Error::TooManyDigits {
             axis: MachineAxis::ALL[axis].name(),
             decimals: program.decimals[axis],
-            limit: dialect.most as f64 * 0.1_f64.powi(i32::from(program.decimals[axis])),
+            limit: dialect.most as f64 / 10_f64.powi(i32::from(program.decimals[axis])),
             control: dialect.title,
             spot: self.spot(index),
         })

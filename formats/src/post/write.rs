@@ -181,19 +181,23 @@ impl Script<'_> {
             }
             (FeedMode::Degrees, _, _) => format!("F is degrees/min of {a}"),
         };
+        let hand = if words[TRAVEL].negative == words[ROTATION].negative {
+            "right"
+        } else {
+            "left"
+        };
         let mut notes = vec![
             format!("units: {unit} and degrees"),
             format!(
-                "{x}: travel along the spindle axis{}; {y}: attack axis, to {point}{}; {a}: turn of the part about {x}, {}",
-                reversed(TRAVEL),
-                reversed(ATTACK),
-                if words[TRAVEL].negative != words[ROTATION].negative {
-                    "left-handed"
-                } else {
-                    "right-handed"
-                },
+                "{x}: travel along the spindle axis{}, 0 is the part's",
+                reversed(TRAVEL)
             ),
-            format!("{x}0 is the part's, {y}0 is the spindle axis; {feed}"),
+            format!(
+                "{y}: attack axis{}, from the spindle axis to {point}",
+                reversed(ATTACK)
+            ),
+            format!("{a}: turn of the part about {x}, {hand}-handed"),
+            feed,
         ];
         match (self.program.angles, &self.dialect.modulo) {
             (Angles::Modulo, Some(modulo)) => {
