@@ -10,6 +10,8 @@ use clap_complete::Shell;
 use horma_core::{Distribution, Simd};
 use horma_formats::job::Overrides;
 
+use crate::traces::{self, Collector};
+
 const AFTER_HELP: &str = "\
 Start with:
   horma init demo                       a sample last, its holders and a job
@@ -118,6 +120,30 @@ Exit codes: 0 no check failed, 2 something here is wrong, 4 master and worker do
     },
 }
 
+impl Command {
+    /// Whose spans are to be sent, and to which collector.
+    pub fn traces(&self) -> Option<(&'static str, &Collector)> {
+        let (service, traces) = match self {
+            Self::Run(run) => ("horma-run", &run.traces),
+            Self::Submit(submit) => ("horma-submit", &submit.traces),
+            Self::Master(master) => ("horma-master", &master.traces),
+            Self::Worker(worker) => (traces::WORKER, &worker.traces),
+            _ => return None,
+        };
+        Some((service, traces.otlp.as_ref()?))
+    }
+}
+
+/// Where it is told what was done for a job, when and by whom.
+#[derive(Debug, Args)]
+pub(crate) struct Traces {
+    /// Collector of OpenTelemetry traces, http://HOST:PORT, to which this process sends over OTLP what it
+    /// does for each job; give it to all processes that take part. OTEL_EXPORTER_OTLP_ENDPOINT is not
+    /// looked at [default: nowhere]
+    #[arg(long, value_name = "URL", env = "HORMA_OTLP")]
+    pub otlp: Option<Collector>,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct Run {
     #[command(flatten)]
@@ -135,6 +161,8 @@ pub(crate) struct Run {
     /// best there is]
     #[arg(long, value_name = "SET", env = "HORMA_SIMD")]
     pub simd: Option<Simd>,
+    #[command(flatten)]
+    pub traces: Traces,
 }
 
 #[derive(Debug, Args)]
@@ -173,6 +201,8 @@ pub(crate) struct Submit {
     pub detach: bool,
     #[command(flatten)]
     pub remote: Remote,
+    #[command(flatten)]
+    pub traces: Traces,
 }
 
 /// A master elsewhere.
@@ -613,6 +643,8 @@ pub(crate) struct Master {
     #[arg(long, value_name = "S", env = "HORMA_DRAIN", default_value_t = 5)]
     pub drain: u64,
     #[command(flatten)]
+    pub traces: Traces,
+    #[command(flatten)]
     pub limits: Limits,
 }
 
@@ -674,6 +706,8 @@ pub(crate) struct Worker {
     /// a master is the end of the work and exit code 0; never to find one is 4
     #[arg(long, value_name = "S", env = "HORMA_PATIENCE", default_value_t = 60)]
     pub patience: u64,
+    #[command(flatten)]
+    pub traces: Traces,
 }
 
 /// Where a worker listens and how it finds its master.

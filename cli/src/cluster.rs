@@ -22,22 +22,36 @@ const START: Duration = Duration::from_secs(30);
 /// A local worker that is gone does not come back; one whose connection broke does, at once.
 const REGROUP: Duration = Duration::from_secs(3);
 
+/// How long workers may take to come to an end in good order.
+const LEAVE: Duration = Duration::from_secs(5);
+
 /// Without a master, a local worker is an orphan.
 const WORKER_PATIENCE: &str = "5";
 
-/// Digitizes a part on `workers` processes of `threads` threads each. Dropping the future stops
-/// them.
+/// Worker processes to start.
+pub(crate) struct Workers<'a> {
+    pub number: u32,
+    /// Of each.
+    pub threads: usize,
+    pub simd: Simd,
+    /// Where they send their spans, if that is wanted.
+    pub otlp: Option<&'a str>,
+}
+
+/// Digitizes a part on worker processes. Dropping the future stops them.
 pub(crate) async fn run(
     part: Part,
     job: Job,
     sharing: Sharing,
-    workers: u32,
-    threads: usize,
-    simd: Simd,
+    workers: Workers<'_>,
     progress: Progress,
 ) -> Result<Outcome> {
-    let local = start(workers, threads, simd).await?;
-    Ok(local.master.run(part, job, sharing, 1, progress).await?)
+    let local = start(&workers).await?;
+    let outcome = local.master.run(part, job, sharing, 1, progress).await;
+    if workers.otlp.is_some() {
+        local.end().await;
+    }
+    Ok(outcome?)
 }
 
 /// A master in this process and its worker processes, until it is dropped.
@@ -45,12 +59,24 @@ pub(crate) struct Local {
     pub master: Master,
     /// Process numbers of the workers.
     pub workers: Vec<u32>,
-    _children: JoinSet<String>,
+    children: JoinSet<String>,
+    leave: CancellationToken,
     _stopped: DropGuard,
 }
 
-/// Starts a master, and `workers` processes of `threads` threads each that register with it.
-pub(crate) async fn start(workers: u32, threads: usize, simd: Simd) -> Result<Local> {
+impl Local {
+    /// Has the workers come to an end in good order: what they hold is not the master's alone when they
+    /// have spans to send.
+    async fn end(mut self) {
+        self.leave.cancel();
+        let all = async { while self.children.join_next().await.is_some() {} };
+        // Whoever takes longer is killed.
+        let _ = tokio::time::timeout(LEAVE, all).await;
+    }
+}
+
+/// Starts a master, and workers that register with it.
+pub(crate) async fn start(workers: &Workers<'_>) -> Result<Local> {
     let (listener, address) = bind("127.0.0.1:0", false).await?;
     let config = Config {
         connections: 1000,
@@ -70,11 +96,20 @@ pub(crate) async fn start(workers: u32, threads: usize, simd: Simd) -> Result<Lo
     // Each child belongs to a task that waits for its end; dropping the set kills them all.
     let mut children = JoinSet::new();
     let mut numbers = Vec::new();
-    for i in 1..=workers {
-        let mut child = spawn(&format!("local-{i}"), &address.to_string(), threads, simd)?;
+    let leave = CancellationToken::new();
+    for i in 1..=workers.number {
+        let mut child = spawn(&format!("local-{i}"), &address.to_string(), workers)?;
         numbers.extend(child.id());
+        let leave = leave.clone();
         children.spawn(async move {
-            match child.wait().await {
+            let ended = tokio::select! {
+                ended = child.wait() => ended,
+                () = leave.cancelled() => {
+                    system::ask_to_stop(&mut child);
+                    child.wait().await
+                }
+            };
+            match ended {
                 Ok(status) => status.to_string(),
                 Err(error) => error.to_string(),
             }
@@ -84,7 +119,8 @@ pub(crate) async fn start(workers: u32, threads: usize, simd: Simd) -> Result<Lo
     Ok(Local {
         master,
         workers: numbers,
-        _children: children,
+        children,
+        leave,
         _stopped: stopped,
     })
 }
@@ -109,17 +145,18 @@ async fn everybody_there(
     }
 }
 
-fn spawn(id: &str, master: &str, threads: usize, simd: Simd) -> Result<Child> {
+fn spawn(id: &str, master: &str, workers: &Workers<'_>) -> Result<Child> {
     let failed = |program: std::path::PathBuf, source| Error::Spawn { program, source };
     let program = std::env::current_exe().map_err(|e| failed("horma".into(), e))?;
     let mut command = Command::new(&program);
     command
         .args(["worker", "--master", master, "--id", id])
         .args(["--bind", "127.0.0.1:0", "--patience", WORKER_PATIENCE])
-        .args(["--threads", &threads.to_string()])
-        .args(["--simd", &simd.to_string()])
+        .args(["--threads", &workers.threads.to_string()])
+        .args(["--simd", &workers.simd.to_string()])
         .env_remove("HORMA_ADVERTISE")
         .env_remove("HORMA_HTTP")
+        .env_remove("HORMA_OTLP")
         .env_remove("HORMA_RENDEZVOUS")
         .env_remove("HORMA_TLS_CA")
         .env_remove("HORMA_TLS_CERT")
@@ -127,6 +164,9 @@ fn spawn(id: &str, master: &str, threads: usize, simd: Simd) -> Result<Child> {
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .kill_on_drop(true);
+    if let Some(collector) = workers.otlp {
+        command.args(["--otlp", collector]);
+    }
     // An interrupt typed at the terminal is for this process alone; it ends its workers.
     #[cfg(unix)]
     command.process_group(0);

@@ -92,6 +92,8 @@ pub(crate) enum Error {
         "without its fallback, or without delta_u and delta_v, the local search goes over the whole path in one process; use `horma run` without workers"
     )]
     OneProcess,
+    #[error("cannot export traces: {0}")]
+    Traces(String),
     #[error("cannot count what goes on: {0}")]
     Metrics(String),
     #[error("{failed} of {checks} checks failed")]
@@ -135,6 +137,7 @@ impl Error {
             | Self::Refused { .. }
             | Self::NoSuchJob { .. }
             | Self::OneProcess
+            | Self::Traces(_)
             | Self::Unfit { here: true, .. }
             | Self::Worker(
                 horma_worker::Error::Address { .. }

@@ -26,6 +26,7 @@ mod serve;
 
 mod progress;
 mod system;
+mod traces;
 
 use std::io::Write;
 use std::path::Path;
@@ -35,17 +36,36 @@ use clap::Parser;
 
 use args::{Arguments, Command};
 use error::{Error, Result};
+use traces::Traces;
+use tracing::info_span;
+use tracing_subscriber::filter::{EnvFilter, FilterExt, filter_fn};
+use tracing_subscriber::layer::{Layer, SubscriberExt};
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let filter = tracing_subscriber::EnvFilter::builder().parse_lossy(&arguments.log);
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
+    let traces = arguments.command.traces();
+    let traces = traces.map(|(service, collector)| Traces::begin(service, collector));
+    let traces = match traces.transpose() {
+        Ok(traces) => traces,
+        Err(error) => return exit_code(Err(error)),
+    };
+    let filter = EnvFilter::builder().parse_lossy(&arguments.log);
+    // What is logged names what it is about. Spans are for traces.
+    let log = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_ansi(false)
+        .with_filter(filter.and(filter_fn(|what| !what.is_span())));
+    tracing_subscriber::registry()
+        .with(log)
+        .with(traces.as_ref().map(Traces::layer))
         .init();
-    exit_code(execute(arguments))
+    let ended = execute(arguments);
+    if let Some(traces) = traces {
+        traces.end();
+    }
+    exit_code(ended)
 }
 
 /// Measures the kernel on the sample, quickly: what `cargo bench` runs. Results go to `output`.
@@ -72,8 +92,8 @@ fn exit_code(ended: Result<()>) -> ExitCode {
 
 fn execute(arguments: Arguments) -> Result<()> {
     match arguments.command {
-        Command::Run(run) => run::run(&run),
-        Command::Submit(submit) => run::submit(&submit),
+        Command::Run(run) => info_span!("run").in_scope(|| run::run(&run)),
+        Command::Submit(submit) => info_span!("submit").in_scope(|| run::submit(&submit)),
         Command::Status(args) => jobs::status(&args),
         Command::Cancel(args) => jobs::cancel(&args),
         Command::Fetch(args) => run::fetch(args),

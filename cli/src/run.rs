@@ -12,11 +12,13 @@ use horma_formats::output::Staging;
 use horma_formats::report::{self, PathStatistics, Report};
 use horma_formats::{csv, output, part, preview};
 use horma_master::{Outcome, Progress};
-use horma_proto::VERSION;
+use horma_proto::{VERSION, trace};
 use tokio_util::sync::CancellationToken;
+use tracing::info_span;
 
 use crate::args::{self, How};
 use crate::client::Remote;
+use crate::cluster::Workers;
 use crate::error::{Error, Result};
 use crate::progress::Display;
 use crate::serve::{NOTICE, runtime};
@@ -44,12 +46,18 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
                 let threads = threads.unwrap_or_else(system::cores);
                 let stopped = stop.clone();
                 let run = move || here::run(&part, job, threads, simd, &display, &stopped);
-                let run = tokio::task::spawn_blocking(run);
+                let span = info_span!("digitize");
+                let run = tokio::task::spawn_blocking(move || span.in_scope(run));
                 return unless(stop, async { run.await.unwrap_or(Err(Error::Interrupted)) }).await;
             }
             let progress = progress(display);
-            let threads = threads.unwrap_or(1);
-            let run = cluster::run(part, job, sharing, workers, threads, simd, progress);
+            let workers = Workers {
+                number: workers,
+                threads: threads.unwrap_or(1),
+                simd,
+                otlp: args.traces.otlp.as_ref().map(|to| &*to.url),
+            };
+            let run = cluster::run(part, job, sharing, workers, progress);
             // Dropping it stops the workers.
             unless(stop, run).await
         },
@@ -73,9 +81,12 @@ pub(crate) fn submit(args: &args::Submit) -> Result<()> {
             let sharing = file.cluster.sharing;
             check_divisible(file)?;
             let sending = submit::send(&remote, &part, file.job, sharing, &name);
+            let sending = trace::within(info_span!("send", otel.kind = "client"), sending);
             let id = *sent.insert(unless(stop.clone(), sending).await?);
             let progress = progress(display);
-            let fetched = unless(stop, submit::fetch(&remote, id, true, &progress)).await;
+            let fetching = submit::fetch(&remote, id, true, &progress);
+            let fetching = trace::within(info_span!("wait and fetch"), fetching);
+            let fetched = unless(stop, fetching).await;
             if let Err(Error::Interrupted) = fetched {
                 // If that does not reach the master, the job is merely done in vain.
                 let _ = submit::cancel(&remote, id).await;
@@ -220,7 +231,8 @@ fn perform(
     let performed = runtime.block_on(async {
         display.tell("read", 0, 0);
         let begin = Instant::now();
-        let (part, file, warnings) = read(asked.file, &asked.how.overrides(workers))?;
+        let reading = || read(asked.file, &asked.how.overrides(workers));
+        let (part, file, warnings) = info_span!("read").in_scope(reading)?;
         output::prepare_dir(asked.output)?;
         let read = phase("read", begin);
         for warning in &warnings {
@@ -235,10 +247,12 @@ fn perform(
             display.tell("verify", 0, 0);
             let begin = Instant::now();
             let threads = threads.unwrap_or_else(system::cores);
+            let verifying = verified(part.clone(), file.clone(), path.positions(), threads);
+            let verifying = trace::within(info_span!("verify"), verifying);
             let found = tokio::select! {
                 biased;
                 () = stop.cancelled() => return Err(Error::Interrupted),
-                found = verified(part.clone(), file.clone(), path.positions(), threads) => found?,
+                found = verifying => found?,
             };
             record.phases.push(phase("verify", begin));
             Some(found)
@@ -252,7 +266,8 @@ fn perform(
             program: None,
             record,
         };
-        write(asked, &file, &part, &path, report, &display, &stop)
+        let writing = || write(asked, &file, &part, &path, report, &display, &stop);
+        info_span!("write").in_scope(writing)
     });
     // Before anything else is said, and also if nothing good came of it.
     display.finish();

@@ -4,6 +4,7 @@ use std::hash::{BuildHasher, RandomState};
 
 use horma_core::{Job, Part, Record, Sharing, Trajectory, stitch};
 use horma_master::{Outcome, Progress};
+use horma_proto::trace::calling;
 use horma_proto::wire::path_reply::Kind as Reply;
 use horma_proto::wire::submit_request::Kind as Request;
 use horma_proto::wire::{
@@ -33,7 +34,7 @@ pub(crate) async fn send(
     };
     let sending = remote.call(async |mut client, _| {
         let requests = requests(&header, part.clone());
-        let reply = client.submit(tokio_stream::iter(requests)).await?;
+        let reply = client.submit(calling(tokio_stream::iter(requests))).await?;
         Ok(reply.into_inner().job)
     });
     sending.await

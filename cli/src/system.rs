@@ -62,6 +62,18 @@ fn cpu_of(_process: u32) -> Option<f64> {
     None
 }
 
+/// Asks a process of ours to come to an end in good order; where that cannot be asked, ends it.
+pub(crate) fn ask_to_stop(child: &mut tokio::process::Child) {
+    #[cfg(target_os = "linux")]
+    if let Some(pid) = child.id().and_then(|id| i32::try_from(id).ok()) {
+        use nix::sys::signal::{Signal, kill};
+        // It may have ended by itself.
+        let _ = kill(nix::unistd::Pid::from_raw(pid), Signal::SIGTERM);
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = child.start_kill();
+}
+
 /// Addresses of this host that others may reach, each with its interface; none where the system does
 /// not tell.
 pub(crate) fn addresses() -> Vec<String> {

@@ -15,11 +15,12 @@ use horma_core::Handout;
 use horma_proto::Error as Refusal;
 use horma_proto::clock::since_1970;
 use horma_proto::metrics::JOBS_ENDED;
+use horma_proto::trace;
 use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
 use tokio::task::spawn_blocking;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
-use tracing::{error, info, warn};
+use tracing::{error, info, info_span, warn};
 
 use self::rules::{Expired, Work, expired, next};
 use crate::error::{Error, Result};
@@ -161,19 +162,24 @@ impl Desk {
         })
     }
 
-    /// Takes a job in, on its place; returns its number.
+    /// Takes a job in, on its place, to be done for the current span; returns its number.
     pub async fn submit(
         self: &Arc<Self>,
         submission: Submission,
         place: OwnedSemaphorePermit,
     ) -> Answer<u64> {
-        let desk = self.clone();
-        let taking = spawn_blocking(move || desk.take_in(submission, place));
+        let (desk, trace) = (self.clone(), trace::current());
+        let taking = spawn_blocking(move || desk.take_in(submission, trace, place));
         let stopping = |_| Refusal::ShuttingDown("the master");
         taking.await.map_err(stopping)?
     }
 
-    fn take_in(&self, submission: Submission, place: OwnedSemaphorePermit) -> Answer<u64> {
+    fn take_in(
+        &self,
+        submission: Submission,
+        trace: Option<String>,
+        place: OwnedSemaphorePermit,
+    ) -> Answer<u64> {
         let Submission {
             key,
             name,
@@ -190,6 +196,7 @@ impl Desk {
             name,
             submitted: since_1970(),
             memory,
+            trace,
             stage: Stage::Queued,
         };
         let (job, new) = self.store.submit(&entry, &pieces).map_err(Refusal::from)?;
@@ -327,7 +334,10 @@ impl Desk {
 
     /// Runs a job and puts what comes of it into the store: the result, or why there is none.
     async fn perform_and_keep(self: &Arc<Self>, job: u64) -> Result<()> {
-        let kept = match self.perform(job).await {
+        let name = self.entry(job).map(|entry| (entry.name, entry.trace));
+        let (name, trace) = name.unwrap_or_default();
+        let span = trace::child_of(trace.as_deref(), info_span!("job", job, name));
+        let kept = match trace::within(span, self.perform(job)).await {
             Ok(pieces) => {
                 let finish = move |store: &Store| store.finish(job, since_1970(), &pieces);
                 self.change(job, finish).await
@@ -360,7 +370,7 @@ impl Desk {
         let planned = planning.await?;
         let workers = self.master.gather(1).await?;
         // Once it is split it stays so, whoever is there.
-        let workers = match self.stage(job) {
+        let workers = match self.entry(job).map(|entry| entry.stage) {
             Some(Stage::Running { workers, .. }) => workers,
             _ => workers,
         };
@@ -387,10 +397,10 @@ impl Desk {
         })
     }
 
-    fn stage(&self, job: u64) -> Option<Stage> {
+    fn entry(&self, job: u64) -> Option<Entry> {
         let jobs = self.lock();
         jobs.get(&job)
-            .map(|known| known.view.borrow().entry.stage.clone())
+            .map(|known| known.view.borrow().entry.clone())
     }
 
     /// The memory that the other jobs under way leave to a job.

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use horma_core::{Counters, Extent, ExtentRecord, Handout, Run, Stock};
 use horma_proto::metrics::{POSITIONS, TRAFFIC};
+use horma_proto::trace::calling;
 use horma_proto::transport::{self, Trouble};
 use horma_proto::wire::digitize_reply::Kind as Reply;
 use horma_proto::wire::digitize_request::Kind as Request;
@@ -81,6 +82,12 @@ pub(crate) struct Undelivered {
     pub positions_received: u64,
 }
 
+impl std::fmt::Display for Undelivered {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.fault.fmt(f)
+    }
+}
+
 /// Makes the attempt; `cut_off` ends it early and says why. It is over as soon as nothing of the extent
 /// is missing.
 pub(crate) async fn dispatch(
@@ -125,7 +132,7 @@ pub(crate) async fn connect(
 async fn call(attempt: &Attempt, sent: &mut Sent) -> Result<ExtentRecord, Fault> {
     let begin = Instant::now();
     let mut client = connect(&attempt.address, attempt.tls.as_ref()).await?;
-    let replies = client.digitize(requests(attempt)).await;
+    let replies = client.digitize(calling(requests(attempt))).await;
     let mut replies = replies.map_err(|s| fault(&s))?.into_inner();
     let finished = receive(attempt, sent, &mut replies).await?;
     let halo_rows = attempt.extent.halo.iter().map(|h| h.rows.len() as u32);

@@ -11,9 +11,10 @@ use std::time::{Duration, Instant};
 use horma_core::{ExtentRecord, Handout};
 use horma_proto::TaskId;
 use horma_proto::clock::incarnation;
+use horma_proto::trace;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
-use tracing::{info, warn};
+use tracing::{Span, info, info_span, warn};
 
 use crate::dispatch::{Undelivered, dispatch};
 use crate::error::Error;
@@ -71,6 +72,8 @@ pub(crate) enum Message {
         /// What there is of it already, if it has a journal.
         resumed: Option<Resumed>,
         progress: Progress,
+        /// What is done for it is a child of this.
+        span: Span,
         reply: Reply,
     },
     Over {
@@ -244,16 +247,18 @@ impl Driver {
                 workers,
                 resumed,
                 progress,
+                span,
                 reply,
             } => {
                 // A job that is kept has its number already; such jobs begin in their order.
                 let number = resumed.as_ref().map(|r| r.journal.job);
                 let job = number.unwrap_or(self.next_job);
                 self.next_job = self.next_job.max(job) + 1;
-                let running = RunningJob::new(plan, workers, resumed, progress, reply);
+                let running = RunningJob::new(plan, workers, resumed, progress, span, reply);
                 let (extents, halos) = (running.extents.len() as u32, running.halos());
                 let done = running.kept.keys().copied().collect();
                 let positions = running.plan.trajectory.positions;
+                running.span.record("job", job);
                 info!(job, extents, positions, "job");
                 running.tell_progress();
                 self.jobs.insert(job, running);
@@ -415,12 +420,15 @@ impl Driver {
         };
         let cut_off = job.call(task, &worker, address);
         let placing = job.placing(task, address, self.incarnation, self.config.tls.clone());
-        info!(%task, worker, rows = placing.rows.len(), "placing");
+        let rows = placing.rows.len();
+        info!(%task, worker, rows, "placing");
+        let span =
+            info_span!(parent: &job.span, "place", otel.kind = "client", %task, worker, rows);
         self.report_when_over(async move {
             Message::Placed {
                 worker,
                 task,
-                outcome: place(placing, cut_off).await,
+                outcome: trace::within(span, place(placing, cut_off)).await,
             }
         });
     }
@@ -440,12 +448,14 @@ impl Driver {
         let holders = rows.into_iter().map(located).collect();
         let tls = self.config.tls.clone();
         info!(%task, worker, helps, "started");
+        let span =
+            info_span!(parent: &job.span, "extent", otel.kind = "client", %task, worker, helps);
         let attempt = job.attempt(task, &worker, address, holders, helps, tls);
         self.report_when_over(async move {
             Message::Over {
                 worker,
                 task,
-                outcome: dispatch(attempt, cut_off).await,
+                outcome: trace::within(span, dispatch(attempt, cut_off)).await,
             }
         });
     }

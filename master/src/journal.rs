@@ -80,7 +80,7 @@ impl Journal {
 }
 
 /// The record, and then the positions as they travel.
-fn to_pieces(positions: &[SubTrajectory], record: &ExtentRecord) -> Result<Pieces> {
+pub(crate) fn to_pieces(positions: &[SubTrajectory], record: &ExtentRecord) -> Result<Pieces> {
     let record = serde_json::to_vec(record).map_err(|e| Error::StoreDamaged(e.to_string()))?;
     let runs = positions.iter().flat_map(|run| {
         let chunks = horma_proto::position_chunks(run.first, &run.touches, &run.between);
@@ -89,7 +89,7 @@ fn to_pieces(positions: &[SubTrajectory], record: &ExtentRecord) -> Result<Piece
     Ok(std::iter::once(record.into()).chain(runs).collect())
 }
 
-fn from_pieces(pieces: &[Bytes], plan: &Handout, extent: &Extent) -> Result<Kept> {
+pub(crate) fn from_pieces(pieces: &[Bytes], plan: &Handout, extent: &Extent) -> Result<Kept> {
     let damaged = Error::StoreDamaged;
     let (record, runs) = pieces
         .split_first()

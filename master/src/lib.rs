@@ -31,6 +31,9 @@ mod dispatch;
 mod place;
 mod received;
 
+#[cfg(any(test, fuzzing))]
+pub mod decoders;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;

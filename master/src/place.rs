@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use horma_core::Handout;
 use horma_proto::metrics::TRAFFIC;
+use horma_proto::trace::calling;
 use horma_proto::wire::place_request::Kind as Request;
 use horma_proto::wire::{self, PlaceRequest};
 use horma_proto::{Chunks, TaskId, Tls};
@@ -59,7 +60,7 @@ pub(crate) async fn place(
     let deadline = DEADLINE + Duration::from_secs_f64(rows as f64 / LEAST_ROWS_A_SECOND);
     let call = async {
         let mut client = connect(&placing.address, placing.tls.as_ref()).await?;
-        let mut request = tonic::Request::new(requests(&placing, sent.clone()));
+        let mut request = calling(requests(&placing, sent.clone()));
         request.set_timeout(deadline);
         let placed = client.place(request).await;
         placed.map(drop).map_err(|status| fault(&status))

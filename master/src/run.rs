@@ -5,8 +5,11 @@ use std::time::{Duration, Instant};
 
 use horma_core::{Handout, Job, Part, Phase, Record, Sharing, SubTrajectory, stitch};
 use horma_proto::metrics::JOB_SECONDS;
+use horma_proto::trace;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
+use tracing::field::Empty;
+use tracing::{Span, info_span};
 
 use crate::driver::{self, Message};
 use crate::error::{Error, Result};
@@ -92,12 +95,15 @@ impl Master {
         at_least: usize,
         progress: Progress,
     ) -> Result<Outcome> {
-        progress("discretize", 0, 0);
-        let memory = self.config.memory;
-        let planned = self.plan(part, job, sharing, memory).await?;
-        let workers = self.gather(at_least.max(1)).await?;
-        let running = self.begin(planned, workers, None, progress).await?;
-        running.end().await
+        let run = async {
+            progress("discretize", 0, 0);
+            let memory = self.config.memory;
+            let planned = self.plan(part, job, sharing, memory).await?;
+            let workers = self.gather(at_least.max(1)).await?;
+            let running = self.begin(planned, workers, None, progress).await?;
+            running.end().await
+        };
+        trace::within(info_span!("job", job = Empty), run).await
     }
 
     /// Plans a job that may take so much memory, on a thread of its own: discretizing a part is work.
@@ -112,7 +118,7 @@ impl Master {
         let here = self.config.workers_here;
         let plan = move || Handout::new(&part, job, sharing, memory, here).map_err(Error::Plan);
         Ok(Planned {
-            plan: Arc::new(blocking(plan).await?),
+            plan: Arc::new(trace::within(info_span!("discretize"), blocking(plan)).await?),
             took: begin.elapsed(),
         })
     }
@@ -132,8 +138,8 @@ impl Master {
         }
     }
 
-    /// Gives a job to the workers, split for so many of them; some of it may be there already.
-    /// Dropping what this returns cancels it.
+    /// Gives a job to the workers, split for so many of them; some of it may be there already. What they
+    /// do for it is done for the current span. Dropping what this returns cancels it.
     pub(crate) async fn begin(
         &self,
         planned: Planned,
@@ -147,6 +153,7 @@ impl Master {
             workers,
             resumed,
             progress: progress.clone(),
+            span: Span::current(),
             reply,
         };
         self.tell(message).await?;
@@ -185,7 +192,8 @@ impl Running {
         (self.progress)("stitch", 0, 0);
         let begin = Instant::now();
         let plan = self.planned.plan;
-        let path = stitch(plan.trajectory, parts).map_err(Error::Stitch)?;
+        let path = info_span!("stitch").in_scope(|| stitch(plan.trajectory, parts));
+        let path = path.map_err(Error::Stitch)?;
         let stitched = begin.elapsed();
         record.phases = [
             ("discretize", self.planned.took),

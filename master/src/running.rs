@@ -11,6 +11,7 @@ use horma_core::{
 };
 use horma_proto::{TaskId, Tls};
 use tokio::sync::oneshot;
+use tracing::Span;
 
 use crate::Progress;
 use crate::dispatch::{Attempt, Coming, needed};
@@ -54,6 +55,8 @@ pub(crate) struct RunningJob {
     /// Who made each attempt at each extent.
     made_by: BTreeMap<(u32, u32), String>,
     workers: BTreeMap<String, String>,
+    /// What is done for it is a child of this.
+    pub span: Span,
     pub reply: Reply,
 }
 
@@ -78,6 +81,7 @@ impl RunningJob {
         workers: u32,
         resumed: Option<Resumed>,
         progress: Progress,
+        span: Span,
         reply: Reply,
     ) -> Self {
         let extents = plan.split(workers);
@@ -116,6 +120,7 @@ impl RunningJob {
             made_by: BTreeMap::new(),
             calls: BTreeMap::new(),
             workers: BTreeMap::new(),
+            span,
             reply,
         }
     }

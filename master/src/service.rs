@@ -12,13 +12,13 @@ use horma_proto::wire::{
     HeartbeatReply, HeartbeatRequest, LeaveReply, LeaveRequest, PathReply, PathRequest,
     RegisterReply, RegisterRequest, StatusReply, StatusRequest, SubmitReply, SubmitRequest,
 };
-use horma_proto::{Error, Guard, Role, Tls, VERSION, transport};
+use horma_proto::{Error, Guard, Role, Tls, VERSION, trace, transport};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request as Call, Response, Status, Streaming};
-use tracing::debug;
+use tracing::{debug, info_span};
 
 use crate::desk::{Desk, View};
 use crate::driver::{Going, Message};
@@ -168,7 +168,11 @@ impl Api for Service {
         call: Call<Streaming<SubmitRequest>>,
     ) -> Result<Response<SubmitReply>, Status> {
         let (desk, _open) = self.desk(&call)?;
-        let job = submit(desk, call.into_inner()).await?;
+        let span = trace::child_of(
+            trace::caller(&call),
+            info_span!("take in", otel.kind = "server"),
+        );
+        let job = trace::within(span, submit(desk, call.into_inner())).await?;
         Ok(Response::new(SubmitReply { job }))
     }
 

@@ -22,7 +22,7 @@ use crate::error::{Error, Result};
 const FILE: &str = "jobs.redb";
 
 /// Changes whenever what is written here changes.
-const FORMAT: u64 = 1;
+const FORMAT: u64 = 2;
 
 /// Memory for pages that were read or written lately; in memory alone there is nothing to gain.
 const CACHE: usize = 32 << 20;
@@ -54,6 +54,8 @@ pub(crate) struct Entry {
     pub submitted: Duration,
     /// Bytes of memory that it is expected to take.
     pub memory: u64,
+    /// The span for which it is done, if the client or the master told of one.
+    pub trace: Option<String>,
     pub stage: Stage,
 }
 
@@ -339,12 +341,15 @@ fn open_entry(t: &WriteTransaction, job: u64) -> Result<Option<Entry>> {
 }
 
 fn put(t: &WriteTransaction, job: u64, entry: &Entry) -> Result<()> {
-    let json = serde_json::to_vec(entry).map_err(|e| Error::StoreDamaged(e.to_string()))?;
-    t.open_table(JOBS)?.insert(job, &json[..])?;
+    t.open_table(JOBS)?.insert(job, &to_json(entry)?[..])?;
     Ok(())
 }
 
-fn from_json(json: &[u8]) -> Result<Entry> {
+pub(crate) fn to_json(entry: &Entry) -> Result<Vec<u8>> {
+    serde_json::to_vec(entry).map_err(|e| Error::StoreDamaged(e.to_string()))
+}
+
+pub(crate) fn from_json(json: &[u8]) -> Result<Entry> {
     serde_json::from_slice(json).map_err(|e| Error::StoreDamaged(e.to_string()))
 }
 
@@ -372,11 +377,11 @@ fn drop_journal(t: &WriteTransaction, job: u64) -> Result<bool> {
 }
 
 /// A piece behind its checksum.
-fn seal(piece: &[u8]) -> Vec<u8> {
+pub(crate) fn seal(piece: &[u8]) -> Vec<u8> {
     [&crc32c::crc32c(piece).to_le_bytes(), piece].concat()
 }
 
-fn unseal(sealed: &[u8]) -> Result<Bytes> {
+pub(crate) fn unseal(sealed: &[u8]) -> Result<Bytes> {
     let (sum, piece) = sealed.split_at_checked(4).unwrap_or_default();
     let found = crc32c::crc32c(piece);
     if sum != found.to_le_bytes() {

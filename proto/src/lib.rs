@@ -17,6 +17,7 @@ mod limit;
 pub mod metrics;
 mod refused;
 pub mod tls;
+pub mod trace;
 pub mod transport;
 
 /// The generated types and services. They stay at the edges: everything else uses the core's types.

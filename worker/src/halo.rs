@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use horma_core::Row;
 use horma_proto::metrics::TRAFFIC;
+use horma_proto::trace::{self, calling};
 use horma_proto::transport::{self, Trouble};
 use horma_proto::wire::worker_client::WorkerClient;
 use horma_proto::wire::{FetchRequest, Span};
@@ -14,7 +15,7 @@ use tokio::task::JoinSet;
 use tokio::time::timeout;
 use tonic::transport::Channel;
 use tonic::{Code, Status};
-use tracing::{debug, warn};
+use tracing::{Instrument, debug, info_span, warn};
 
 use crate::receive::Rows;
 use crate::store::Store;
@@ -62,7 +63,7 @@ pub(crate) async fn fetch_all(
     for source in sources {
         match store.get(source.id) {
             Some(rows) => all.rows.extend(some_of(&rows, &source.rows).cloned()),
-            None => drop(fetching.spawn(fetch(source, tls.clone()))),
+            None => drop(fetching.spawn(fetch(source, tls.clone()).in_current_span())),
         }
     }
     while let Some(fetched) = fetching.join_next().await {
@@ -86,24 +87,23 @@ async fn fetch(source: Source, tls: Option<Tls>) -> Result<Fetched, Lost> {
     let mut pause = PAUSE;
     let mut tried = 1;
     loop {
-        match ask(&source, tls.as_ref()).await {
+        let (id, worker) = (source.id, &source.worker);
+        let span = info_span!("fetch rows", otel.kind = "client", %id, worker);
+        match trace::within(span, ask(&source, tls.as_ref())).await {
             Ok(fetched) => {
-                debug!(id = %source.id, worker = source.worker, rows = fetched.rows.len(), "rows fetched");
+                debug!(%id, worker, rows = fetched.rows.len(), "rows fetched");
                 return Ok(fetched);
             }
             Err(status) if tried < TRIES && may_pass(&status) => {
-                warn!(id = %source.id, worker = source.worker, reason = chain(&status), "no rows yet");
+                warn!(%id, worker, reason = chain(&status), "no rows yet");
                 tokio::time::sleep(pause).await;
                 (pause, tried) = (2 * pause, tried + 1);
             }
             Err(status) => {
-                let (worker, address) = (&source.worker, &source.address);
+                let address = &source.address;
                 let reason = format!("worker {worker} at {address}: {}", chain(&status));
-                warn!(id = %source.id, reason, "no rows");
-                return Err(Lost {
-                    source: source.id,
-                    reason,
-                });
+                warn!(%id, reason, "no rows");
+                return Err(Lost { source: id, reason });
             }
         }
     }
@@ -125,7 +125,7 @@ async fn ask(source: &Source, tls: Option<&Tls>) -> Result<Fetched, Status> {
         let seconds = SILENCE.as_secs();
         Status::deadline_exceeded(format!("it sent nothing for {seconds} s"))
     };
-    let reply = timeout(SILENCE, client.fetch_rows(request)).await;
+    let reply = timeout(SILENCE, client.fetch_rows(calling(request))).await;
     let mut chunks = reply.map_err(silent)??.into_inner();
     let (mut rows, mut bytes) = (Rows::default(), 0);
     let expected = horma_proto::spanned(&source.rows);

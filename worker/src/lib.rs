@@ -18,6 +18,9 @@ mod store;
 
 mod work;
 
+#[cfg(any(test, fuzzing))]
+pub mod decoders;
+
 use std::sync::Arc;
 use std::time::Duration;
 

@@ -8,9 +8,13 @@ use horma_proto::wire::place_request::Kind as Placing;
 use horma_proto::wire::task::Supply as Announced;
 use horma_proto::wire::{self, DigitizeRequest, PlaceRequest, Run};
 use horma_proto::{Error, Messages, Result, TaskId};
-use tonic::{Status, Streaming};
+use tokio_stream::{Stream, StreamExt};
+use tonic::Status;
 
 use crate::halo::Source;
+
+/// What is sent, or what its sender is told.
+type Answer<T> = std::result::Result<T, Status>;
 
 /// A task and what its rows come from.
 pub(crate) struct Task {
@@ -82,15 +86,15 @@ fn complete(what: &'static str, found: u64, expected: u64, rest: &Messages) -> R
 
 /// Receives a task and what comes with it.
 pub(crate) async fn task(
-    mut requests: Streaming<DigitizeRequest>,
-) -> std::result::Result<Task, Status> {
+    mut requests: impl Stream<Item = Answer<DigitizeRequest>> + Unpin,
+) -> Answer<Task> {
     let begin = Instant::now();
-    let Some(Request::Task(header)) = requests.message().await?.and_then(|r| r.kind) else {
+    let Some(Request::Task(header)) = requests.try_next().await?.and_then(|r| r.kind) else {
         return Err(no_header("task").into());
     };
     let mut task = header_from_wire(horma_proto::open(&header)?)?;
     let (mut rows, mut grids) = (Rows::default(), (Messages::default(), Vec::new()));
-    while let Some(request) = requests.message().await? {
+    while let Some(request) = requests.try_next().await? {
         match (request.kind, &task.announced) {
             (Some(Request::Rows(chunk)), Announced::Rows(_)) => rows.push(&chunk)?,
             (Some(Request::Rows(chunk)), Announced::Grids(_)) => {
@@ -117,14 +121,14 @@ pub(crate) async fn task(
 
 /// Receives the rows that this worker is to hold: whose job it is, by which attempt, and the rows.
 pub(crate) async fn placement(
-    mut requests: Streaming<PlaceRequest>,
-) -> std::result::Result<(u64, TaskId, Vec<Row>), Status> {
-    let Some(Placing::Placement(header)) = requests.message().await?.and_then(|r| r.kind) else {
+    mut requests: impl Stream<Item = Answer<PlaceRequest>> + Unpin,
+) -> Answer<(u64, TaskId, Vec<Row>)> {
+    let Some(Placing::Placement(header)) = requests.try_next().await?.and_then(|r| r.kind) else {
         return Err(no_header("placement").into());
     };
     let id = header.id.try_into()?;
     let mut rows = Rows::default();
-    while let Some(request) = requests.message().await? {
+    while let Some(request) = requests.try_next().await? {
         match request.kind {
             Some(Placing::Rows(chunk)) => rows.push(&chunk)?,
             _ => return Err(no_header("placement").into()),

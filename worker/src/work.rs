@@ -13,7 +13,7 @@ use tokio::sync::mpsc::Sender;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
-use tracing::{debug, info};
+use tracing::{Instrument, debug, info, info_span};
 
 use crate::halo::{Fetched, Lost, fetch_all, some_of};
 use crate::receive::{Supply, Task};
@@ -143,7 +143,9 @@ async fn digitize(task: Task, means: &Means, replies: &Replies) -> Result<wire::
             shutdown: means.shutdown.clone(),
         };
         let pool = means.pool.clone();
-        let done = tokio::task::spawn_blocking(move || pool.install(|| job.run())).await;
+        let span = info_span!("digitize", first = job.run.first, count = job.run.count);
+        let run = move || span.in_scope(|| pool.install(|| job.run()));
+        let done = tokio::task::spawn_blocking(run).await;
         let done = done.map_err(|_| Status::internal("digitizing panicked"))?;
         let cost = done.ok_or(Failure::Abandoned)?;
         finished.build_seconds += cost.build_seconds;
@@ -172,14 +174,15 @@ async fn at_hand(
     match supply {
         Supply::Rows(rows) => Ok((Arc::new(rows), None)),
         Supply::Grids(grids) => {
-            let made = tokio::task::spawn_blocking(move || {
+            let span = info_span!("make rows");
+            let make = move || {
                 let mut rows: Vec<Row> = Vec::new();
                 for grid in &grids {
                     grid.rows(&mut |row| rows.push(row));
                 }
                 rows
-            });
-            let made = made.await;
+            };
+            let made = tokio::task::spawn_blocking(move || span.in_scope(make)).await;
             let rows = made.map_err(|_| Status::internal("making rows panicked"))?;
             debug!(%id, rows = rows.len(), "rows made");
             if let Some(pair) = rows.windows(2).find(|pair| pair[0].id >= pair[1].id) {
@@ -190,10 +193,9 @@ async fn at_hand(
         }
         Supply::Held { own, halo } => {
             let rows = means.store.get(own).ok_or(Error::NotHeld { id: own })?;
-            let rows_of_others =
-                tokio::spawn(fetch_all(halo, means.store.clone(), means.tls.clone()));
+            let fetching = fetch_all(halo, means.store.clone(), means.tls.clone());
             let coming = Coming {
-                rows: rows_of_others,
+                rows: tokio::spawn(fetching.in_current_span()),
             };
             Ok((rows, Some(coming)))
         }

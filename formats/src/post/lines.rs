@@ -201,7 +201,7 @@ mod tests {
             plain = text(Control::Fanuc, |l| l.feed(feed, 9999.999));
             let value: f64 = plain[2..].parse().expect("a number");
             assert!(
-                plain.contains('.') && value <= 9999.999 && value >= 0.001,
+                plain.contains('.') && (0.001..=9999.999).contains(&value),
                 "{plain}"
             );
         }

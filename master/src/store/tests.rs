@@ -32,6 +32,7 @@ fn entry(key: u128) -> Entry {
         key,
         name: format!("job of {key}"),
         submitted: AT,
+        trace: None,
         memory: u64::MAX,
         stage: Stage::Queued,
     }

@@ -3,14 +3,20 @@
 
 #![allow(dead_code)] // Each fuzz target uses its part of this.
 
-use horma_proto::{Messages, TaskId, wire};
+#[cfg(test)]
+pub mod samples;
+
+use horma_core::stitch;
+use horma_proto::wire::digitize_reply::Kind as Reply;
+use horma_proto::wire::path_reply::Kind as Path;
+use horma_proto::{Messages, TaskId, transport, wire};
 use prost::Message;
 
 /// A decoder to try.
 pub type Decoder = fn(&[u8]);
 
 /// All of them, by name.
-pub const DECODERS: [(&str, Decoder); 7] = [
+pub const DECODERS: [(&str, Decoder); 10] = [
     ("job", job),
     ("row", row),
     ("body", body),
@@ -18,6 +24,9 @@ pub const DECODERS: [(&str, Decoder); 7] = [
     ("positions", positions),
     ("chunks", chunks),
     ("task", task),
+    ("reply", reply),
+    ("path", path),
+    ("address", address),
 ];
 
 /// A job as it comes from a client or from the master.
@@ -111,5 +120,63 @@ pub fn task(bytes: &[u8]) {
     }
     if let Some(job) = &task.job {
         self::job(&job.encode_to_vec());
+    }
+}
+
+/// What a worker answers the master.
+pub fn reply(bytes: &[u8]) {
+    let Ok(reply) = wire::DigitizeReply::decode(bytes) else {
+        return;
+    };
+    let counters = horma_proto::counters_from_wire(reply.counters.unwrap_or_default());
+    let again = horma_proto::counters_to_wire(counters);
+    assert_eq!(horma_proto::counters_from_wire(again), counters);
+    match reply.kind {
+        Some(Reply::Positions(all)) => positions(&all.encode_to_vec()),
+        Some(Reply::HaloLost(lost)) => drop(TaskId::try_from(lost.source)),
+        Some(Reply::Finished(_)) | None => {}
+    }
+}
+
+/// A path as it comes to a client: replies, length-delimited, with checksums that hold.
+pub fn path(mut bytes: &[u8]) {
+    let (mut trajectory, mut parts) = (None, Vec::new());
+    while let Ok(reply) = wire::PathReply::decode_length_delimited(&mut bytes) {
+        match reply.kind {
+            Some(Path::Path(header)) => {
+                let header = horma_proto::open(&horma_proto::chunk(header.data));
+                let Ok(header) = header as Result<wire::PathHeader, _> else {
+                    return;
+                };
+                trajectory = horma_proto::trajectory_from_wire(header.trajectory.as_ref()).ok();
+            }
+            Some(Path::Positions(mut positions)) => {
+                positions.crc32c = horma_proto::checksum(&positions);
+                let count = trajectory.map_or(0, |t| t.positions);
+                let Ok(run) = horma_proto::unpack_positions(&positions, count) else {
+                    return;
+                };
+                parts.push(run);
+            }
+            Some(Path::Record(_) | Path::Progress(_)) | None => {}
+        }
+    }
+    let Some(trajectory) = trajectory else {
+        return;
+    };
+    if let Ok(path) = stitch(trajectory, parts) {
+        assert_eq!(path.touches.len() as u64, trajectory.positions);
+        assert_eq!(
+            path.positions().len(),
+            path.touches.len() + path.between.len()
+        );
+    }
+}
+
+/// The address that a worker gives as its own.
+pub fn address(bytes: &[u8]) {
+    if let Ok(address) = std::str::from_utf8(bytes) {
+        // It is refused, or dialled some day.
+        let _ = transport::endpoint(address);
     }
 }

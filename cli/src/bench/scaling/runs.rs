@@ -8,9 +8,10 @@ use tokio_util::sync::CancellationToken;
 
 use super::super::check;
 use crate::args::Search;
+use crate::cluster::{self, Workers};
 use crate::error::{Error, Result};
 use crate::progress::Display;
-use crate::{cluster, here, system};
+use crate::{here, system};
 
 /// What is run in every round.
 #[derive(Debug, Clone, Copy)]
@@ -140,7 +141,13 @@ async fn spread(
     round: u32,
 ) -> Result<(Run, ToolPath)> {
     let begin = Instant::now();
-    let local = cluster::start(workers, 1, Simd::best()).await?;
+    let workers = Workers {
+        number: workers,
+        threads: 1,
+        simd: Simd::best(),
+        otlp: None,
+    };
+    let local = cluster::start(&workers).await?;
     let start = begin.elapsed().as_secs_f64();
     // To start processes is no master's work.
     let before = own_cpu();
