@@ -1,8 +1,10 @@
 ; job: golden.toml
 ; cutter: kind "torus"
 ; units: mm and degrees
-; X: travel along the spindle axis, Y: attack axis, to the tool centre, A: turn of the part about X, right-handed
-; X0 is the part's, Y0 is the spindle axis, F is mm/min over X, Y and A, a degree as one of the mm
+; X: travel along the spindle axis, 0 is the part's
+; Y: attack axis, from the spindle axis to the tool centre
+; A: turn of the part about X, right-handed
+; F is mm/min over X, Y and A, a degree as one of the mm
 ; start the cutter before this program: it starts no spindle and changes no tool
 N10 G71 G90 G17 G40 G94
 N20 G0 Y122.0349

@@ -1,9 +1,10 @@
 (job: golden.toml)
 (cutter: kind "torus")
 (units: mm and degrees)
-(X: travel along the spindle axis, Y: attack axis, to the tool centre, A: turn)
-(of the part about X, right-handed)
-(X0 is the part's, Y0 is the spindle axis, under G93 F is 1/min)
+(X: travel along the spindle axis, 0 is the part's)
+(Y: attack axis, from the spindle axis to the tool centre)
+(A: turn of the part about X, right-handed)
+(under G93 F is 1/min)
 (start the cutter before this program: it starts no spindle and changes no)
 (tool)
 G21 G90 G17 G40 G49 G80 G94
