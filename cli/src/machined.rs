@@ -33,7 +33,7 @@ pub(crate) fn machined(args: &args::Machined) -> Result<()> {
         .collect();
     let (part, _) = part::read_all(&file.files)?;
     let part = place(part, file.axis)?;
-    output::prepare_dir_of(&args.output, &output::MACHINED_FILES)?;
+    output::prepare_dir_of(&args.output, output::of_machined)?;
     let threads = args.threads.map_or_else(system::cores, usize::from);
     let surface = system::pool(threads)?.install(|| {
         let model = discretize(&part, file.job.discretization)?;
@@ -45,7 +45,7 @@ pub(crate) fn machined(args: &args::Machined) -> Result<()> {
     })?;
     let tolerance = crate::verify::tolerance(&file);
     let figures = figures(&surface, tolerance);
-    let staging = Staging::begin_of(&args.output, &output::MACHINED_FILES)?;
+    let staging = Staging::begin_of(&args.output, output::of_machined)?;
     ply::save(&staging.file(output::MACHINED_MESH), &surface)?;
     map::save(&staging.file(output::MACHINED_MAP), &surface)?;
     staging.publish()?;
@@ -53,7 +53,7 @@ pub(crate) fn machined(args: &args::Machined) -> Result<()> {
         say(&serde_json::to_string_pretty(&figures).unwrap_or_default());
     } else {
         say(&describe(&figures, tolerance));
-        for name in output::MACHINED_FILES {
+        for name in [output::MACHINED_MESH, output::MACHINED_MAP] {
             say(&args.output.join(name).display().to_string());
         }
     }

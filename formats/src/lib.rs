@@ -16,10 +16,10 @@ mod decimal;
 pub mod output;
 
 pub mod csv;
-pub mod gcode;
 pub mod map;
 pub mod plot;
 pub mod ply;
+pub mod post;
 pub mod preview;
 pub mod report;
 

@@ -133,7 +133,7 @@ fn svg(surface: &Machined) -> String {
         bottom + 42.0,
         "travel, mm",
     );
-    let [bar_left, bar_top, bar_right, bar_bottom] = BAR;
+    let [bar_left, _, bar_right, bar_bottom] = BAR;
     let end = scale.end;
     for (share, anchor) in [(-1.0, "start"), (0.0, "middle"), (1.0, "end")] {
         let x = (bar_left + bar_right) / 2.0 + share * (bar_right - bar_left) / 2.0;
