@@ -20,5 +20,6 @@ pub mod gcode;
 pub mod plot;
 pub mod preview;
 pub mod report;
+pub mod view;
 
 pub use error::{Error, Result};

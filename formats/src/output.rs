@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use crate::error::{Error, Result};
 
 /// Every name that a run may give a file of its output directory.
-pub const FILES: [&str; 4] = [PATH, REPORT, PROGRAM, PREVIEW];
+pub const FILES: [&str; 5] = [PATH, REPORT, PROGRAM, PREVIEW, VIEW];
 /// The tool path.
 pub const PATH: &str = "path.csv";
 /// What was computed, by whom and how fast.
@@ -18,6 +18,8 @@ pub const REPORT: &str = "report.json";
 pub const PROGRAM: &str = "path.ngc";
 /// The picture.
 pub const PREVIEW: &str = "preview.png";
+/// The run to look at.
+pub const VIEW: &str = "report.html";
 
 /// Every name that a bench of the kernel may give a file of its output directory.
 pub const BENCH_FILES: [&str; 3] = [BENCH_TABLE, BENCH_FIGURES, BENCH_PLOT];
