@@ -22,6 +22,7 @@ mod http;
 mod inspect;
 mod reach;
 mod serve;
+mod view;
 
 mod progress;
 mod system;
@@ -97,6 +98,7 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Cancel(args) => jobs::cancel(&args),
         Command::Fetch(args) => run::fetch(args),
         Command::Verify(args) => verify::verify(&args),
+        Command::View(args) => view::view(&args),
         Command::Master(master) => serve::master(&master),
         Command::Worker(worker) => serve::worker(worker),
         Command::Doctor(args) => doctor::doctor(&args),

@@ -42,9 +42,9 @@ const rim = path.travels.map((x, i) => (Number.isNaN(path.heights[i]) ? NaN : pa
 const choices = [];
 
 if (surface.clearances?.length) {
-  const { gouge, excess } = report.verification.normal;
-  // Hollows that no wheel enters would take all colours for themselves.
-  const limit = Math.max(gouge?.depth ?? 0, excess?.p99 ?? 0, 1e-4);
+  const { normal: { gouge, excess }, scallop } = report.verification;
+  // What is cut as it should be fills the colours; hollows that no wheel enters would take all of them.
+  const limit = Math.max(gouge?.depth ?? 0, 1.5 * (scallop.predicted ?? 0), 3 * (excess?.median ?? 0), 1e-4);
   const [low, high] = range(surface.clearances);
   choices.push({
     id: "errors", name: "gouge and excess of the surface", values: surface.clearances, on: "surface",
@@ -55,7 +55,7 @@ if (surface.clearances?.length) {
 choices.push(
   { id: "height", name: "tool centre", values: path.heights, on: "path", scale: scale(path.heights, "mm", false) },
   { id: "speed", name: "speed of the attack axis", values: path.slopes, on: "path",
-    scale: scale(path.slopes, "mm/°", true, 0.998), ends: ["retracts", "advances"].reverse() },
+    scale: scale(path.slopes, "mm/°", true, 0.998), ends: ["towards the part", "away from it"] },
   { id: "bend", name: "acceleration of the attack axis", values: path.bends, on: "path",
     scale: scale(path.bends, "mm/°²", true, 0.99) },
   { id: "rim", name: "where on the wheel it touches", values: rim, on: "path", scale: scale(rim, "mm", true, 1),

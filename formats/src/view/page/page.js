@@ -39,7 +39,7 @@ function theme() {
   return found;
 }
 
-let colours_ = theme();
+let scheme = theme();
 let due = 0;
 let map = null;
 
@@ -52,11 +52,11 @@ function draw() {
   due = 0;
   const { position, choice } = state;
   const show = Object.fromEntries(["part", "contacts", "centres", "wheel"].map((n) => [n, $(`#show-${n}`).checked]));
-  picture?.draw({ position, choice, show, theme: colours_ });
+  picture?.draw({ position, choice, show, theme: scheme });
   if (map?.choice !== choice) map = { ...mapPicture(choice), choice };
-  drawMap($("#map"), map, position, colours_);
-  drawAxis($("#axis"), { ...state, theme: colours_ });
-  if (surface.clearances?.length) drawHistogram($("#histogram"), choices[0], colours_);
+  drawMap($("#map"), map, position, scheme);
+  drawAxis($("#axis"), { ...state, theme: scheme });
+  if (surface.clearances?.length) drawHistogram($("#histogram"), choices[0], scheme);
   drawLegend(choice);
   tell(position);
 }
@@ -64,7 +64,7 @@ function draw() {
 function drawLegend(choice) {
   const figure = $("#legend");
   const bar = $("canvas", figure);
-  const words_ = $("figcaption", figure);
+  const captions = $("figcaption", figure);
   fit(bar);
   const pen = bar.getContext("2d");
   if (!choice.scale) {
@@ -72,7 +72,7 @@ function drawLegend(choice) {
       pen.fillStyle = `rgb(${distinct(i)})`;
       pen.fillRect((bar.width * i) / workers.length, 0, bar.width / workers.length, bar.height);
     });
-    words_.replaceChildren(...workers.map((name) => make("span", "", name)));
+    captions.replaceChildren(...workers.map((name) => make("span", "", name)));
     return;
   }
   const { low, high, unit, beyond } = choice.scale;
@@ -81,11 +81,11 @@ function drawLegend(choice) {
     pen.fillRect(x, 0, 1, bar.height);
   }
   const [before, after] = choice.ends ?? ["", ""];
-  const more = beyond ? " and beyond" : "";
-  words_.replaceChildren(
-    make("span", "", `${before} ${rough(low)} ${unit}${more}`.trim()),
+  const [least, greatest] = beyond ? ["≤ ", "≥ "] : ["", ""];
+  captions.replaceChildren(
+    make("span", "", `${before} ${least}${rough(low)} ${unit}`.trim()),
     make("span", "", `${rough((low + high) / 2)}`),
-    make("span", "", `${after} ${rough(high)} ${unit}${more}`.trim()),
+    make("span", "", `${after} ${greatest}${rough(high)} ${unit}`.trim()),
   );
 }
 
@@ -249,7 +249,7 @@ $("#shown").textContent = shownNote();
 $("#tables").append(...tables());
 describe();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-  colours_ = theme();
+  scheme = theme();
   redraw();
 });
 new ResizeObserver(redraw).observe($("main"));

@@ -55,7 +55,21 @@ function unroll(choice) {
     const at = row * columns + Math.floor((x - low) / cell);
     if (Number.isNaN(cells[at]) || Math.abs(value - middle) > Math.abs(cells[at] - middle)) cells[at] = value;
   });
-  return { low, high: low + columns * cell, columns, rows, cells };
+  return { low, high: low + columns * cell, columns, rows, cells: errors ? filled(cells, columns) : cells };
+}
+
+/// Where the surface comes near the spindle its samples are too few for every cell: one without takes
+/// what is beside it.
+function filled(cells, columns) {
+  for (let pass = 0; pass < 8; pass++) {
+    const before = cells.slice();
+    before.forEach((value, i) => {
+      if (!Number.isNaN(value)) return;
+      const beside = [i - columns, i + columns, i - 1, i + 1].map((k) => before[k]);
+      cells[i] = beside.find((v) => v === v) ?? NaN;
+    });
+  }
+  return cells;
 }
 
 /// The map as a picture of its own, made once for each choice.
@@ -271,7 +285,7 @@ function drawHistogram(canvas, choice, theme) {
   const total = all.reduce((sum, c) => sum + c.count, 0);
   const greatest = Math.max(...all.map((c) => c.count));
   const pitch = Math.min((height - 4) / all.length, 30);
-  const [left, right] = [112, 66];
+  const [left, right] = [124, 66];
   all.forEach((one, i) => {
     const y = 2 + i * pitch;
     const middle = one.from === undefined ? one.to : one.to === undefined ? one.from : (one.from + one.to) / 2;

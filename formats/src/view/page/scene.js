@@ -93,7 +93,8 @@ function scene(canvas) {
     const turned = [Math.cos(angle), Math.sin(angle)];
     gl.uniform2fv(at.turn, turned);
     gl.uniform3f(at.shift, 0, 0, 0);
-    const paint = (rgb, alpha = 1) => gl.uniform4f(at.paint, ...rgb.map((c) => c / 255), rgb.length && alpha);
+    const paint = (rgb, alpha = 1) => gl.uniform4f(at.paint, ...rgb.map((c) => c / 255), alpha);
+    const ownColours = () => paint([0, 0, 0], 0);
     const set = (lit, lift, size = 1) => {
       gl.uniform1i(at.lit, lit);
       gl.uniform1f(at.lift, lift);
@@ -108,7 +109,7 @@ function scene(canvas) {
       if (errors) {
         // Samples tint what is lit below them, each place once and the worst first.
         set(false, LIFT, Math.max(1.5, 1.7 * scale * report.verification.spacing));
-        paint([0, 0, 0], 0);
+        ownColours();
         gl.enable(gl.BLEND);
         gl.blendFunc(gl.DST_COLOR, gl.ZERO);
         gl.enable(gl.STENCIL_TEST);
@@ -125,11 +126,11 @@ function scene(canvas) {
       if (!show[name] || (errors && name === "contacts")) continue;
       set(false, name === "contacts" ? LIFT : 0);
       if (errors) paint(theme.line);
-      else paint([0, 0, 0], 0);
+      else ownColours();
       line.draw();
     }
-    const height_ = path.heights[position];
-    const touching = !Number.isNaN(height_);
+    const reached = path.heights[position];
+    const touching = !Number.isNaN(reached);
     if (touching) {
       set(false, 3 * LIFT, 9 * devicePixelRatio);
       paint(theme.mark);
@@ -137,7 +138,7 @@ function scene(canvas) {
     }
     if (show.wheel) {
       gl.uniform2f(at.turn, 1, 0);
-      gl.uniform3f(at.shift, path.travels[position], touching ? height_ : box.top, 0);
+      gl.uniform3f(at.shift, path.travels[position], touching ? reached : box.top, 0);
       set(true, 0);
       paint(theme.wheel, touching ? 0.62 : 0.25);
       gl.enable(gl.BLEND);
@@ -163,15 +164,17 @@ function fit(canvas) {
 
 /// The middle of what is shown, and how wide, high and deep the picture has to be for it.
 function extent() {
-  const [low, high] = range(path.travels);
-  const reach = Math.max(range(path.heights)[1], 1);
-  const [least, greatest] = range(part.points.filter((_, i) => i % 3 === 0));
-  const [from, to] = [Math.min(low, least), Math.max(high, greatest)];
+  const axis = (k) => part.points.filter((_, i) => i % 3 === k);
+  const [from, to] = range([...range(path.travels), ...range(axis(0))]);
+  const [y, z] = [axis(1), axis(2)];
+  const radius = Math.max(...range(y.map((v, i) => Math.hypot(v, z[i]))), 1);
+  const reach = Math.max(range(path.heights)[1], radius);
   const rim = Math.max(...contents.wheel.map(([, m]) => m));
+  const { yaw, pitch } = HOME;
   return {
-    centre: [(from + to) / 2, 0.3 * reach, 0],
-    wide: (to - from) * Math.cos(HOME.yaw) + 1.5 * reach,
-    high: 2.5 * reach,
+    centre: [(from + to) / 2, (reach + rim - radius) / 2, 0],
+    wide: 1.03 * ((to - from) * Math.cos(yaw) + 2 * radius * Math.sin(yaw)),
+    high: (reach + rim + radius) * Math.cos(pitch) + (to - from) * Math.sin(yaw) * Math.sin(pitch),
     deep: 2 * (to - from + reach + rim),
     top: reach + 20,
   };

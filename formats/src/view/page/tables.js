@@ -12,7 +12,7 @@ function make(tag, kind, ...content) {
 function table(title, columns, rows, kind = "") {
   const head = make("tr", "", ...columns.map((name, i) => heading(name, "col", i ? "number" : "")));
   const body = rows.map(([name, ...cells]) => {
-    const all = cells.map((cell) => make("td", typeof cell === "string" && /[a-z]{3}/i.test(cell) ? "" : "number", cell ?? "–"));
+    const all = cells.map((cell) => make("td", columns.length && /[a-z]{3}/i.test(cell) ? "" : "number", cell ?? "–"));
     return make("tr", "", heading(name, "row"), ...all);
   });
   const shown = columns.length ? [make("thead", "", head)] : [];
@@ -22,7 +22,7 @@ function table(title, columns, rows, kind = "") {
   scroll.tabIndex = 0;
   scroll.role = "region";
   scroll.ariaLabel = title;
-  return make("article", kind, make("h3", "", title), scroll);
+  return make("article", kind || (columns.length ? "" : "pairs"), make("h3", "", title), scroll);
 }
 
 function heading(text, scope, kind = "") {
@@ -113,13 +113,14 @@ function flat(value, name = "") {
   if (typeof value === "object" && !(Array.isArray(value) && value.every((v) => typeof v !== "object"))) {
     return Object.entries(value).flatMap(([key, inner]) => flat(inner, name ? `${name} · ${spaced(key)}` : spaced(key)));
   }
-  const text = (v) => (typeof v === "number" ? rough(v, 8) : String(v));
+  const number = (n) => (Number.isInteger(n) ? count.format(n).replace("-", "−") : rough(n, 8));
+  const text = (v) => (typeof v !== "number" ? String(v) : name.startsWith("bytes") ? bytes(v) : number(v));
   return [[name, Array.isArray(value) ? value.map(text).join(", ") : text(value)]];
 }
 
 const spaced = (key) => key.replaceAll("_", " ");
 
-/// All tables, what matters most first.
+/// All tables, what matters most first; the narrow ones are in columns.
 function tables() {
   const { version, job, warnings, path: figures, verification, phases, bodies, extents, lost, second, counters, traffic, window, workers, extents_from_journal, ...others } = report;
   const all = [pathTable(figures)];
@@ -135,5 +136,6 @@ function tables() {
   if (second.length) all.push(attemptsTable("Second attempts", second));
   if (job) all.push(plain("The job in effect", job));
   all.push(table("Made by", [], [["horma", version], ["extents taken from the journal", whole(extents_from_journal)]]));
-  return all;
+  const broad = (t) => t.classList.contains("broad");
+  return [make("div", "narrow", ...all.filter((t) => !broad(t))), ...all.filter(broad)];
 }
