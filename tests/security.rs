@@ -7,7 +7,9 @@ mod look;
 
 use std::path::{Path, PathBuf};
 
-use common::{Process, horma, path_of, report, run, sample, scratch, succeed, text, texts};
+use common::{
+    Process, horma, path_of, report, run, sample, scratch, succeed, text, texts, wait_until,
+};
 use horma_proto::tls::{Role, Tls};
 use horma_proto::transport::{connect, endpoint};
 use horma_proto::wire::master_client::MasterClient;
@@ -110,6 +112,64 @@ fn a_cluster_with_certificates_gives_the_same_bytes() {
     let report = report(&out);
     assert_eq!(report["extents"].as_array().map(Vec::len), Some(2));
     assert_eq!(report["lost"].as_array().map(Vec::len), Some(0));
+}
+
+/// Has other files in the place of some.
+fn replace(dir: &Path, by: &Authority, files: &[&str]) {
+    for file in files {
+        std::fs::copy(by.file(file), dir.join(file)).expect("writable");
+    }
+}
+
+#[test]
+fn servers_go_by_new_certificates_without_a_restart() {
+    let dir = scratch();
+    let alone = path_of(&sample(), dir.path(), "alone", &[]);
+    let before = Authority::new(dir.path(), "before");
+    let after = Authority::new(dir.path(), "after");
+    let live = Authority::new(dir.path(), "live");
+    let all = [
+        "ca.pem",
+        "master.pem",
+        "master.key",
+        "worker.pem",
+        "worker.key",
+    ];
+    replace(&live.dir, &before, &all);
+    let (mut master, address) = live.master();
+    let (mut worker, _) = live.worker(&address, "w");
+    for server in [&mut master, &mut worker] {
+        server.wait_for(&["certificates read"]);
+    }
+
+    // An authority that did not sign what is shown: they stay with what they have.
+    replace(&live.dir, &after, &["ca.pem"]);
+    for server in [&mut master, &mut worker] {
+        server.wait_for(&["certificates not renewed", "not signed by the authority"]);
+    }
+    let submit = |authority: &Authority, name: &str| {
+        let out = dir.path().join(name);
+        let args = ["submit", text(&sample()), "--master", &address, "-q", "-o"].map(str::to_owned);
+        let all = [
+            &args[..],
+            &[text(&out).to_owned()],
+            &authority.args("client"),
+        ]
+        .concat();
+        succeed(&words(&all));
+        assert!(std::fs::read(out.join("path.csv")).expect("a path") == alone);
+    };
+    submit(&before, "still");
+
+    replace(&live.dir, &after, &all);
+    for server in [&mut master, &mut worker] {
+        wait_until("the new certificates are read", || {
+            server.times_said(&["certificates read"]) == 2
+        });
+    }
+    submit(&after, "anew");
+    let other = "its certificate is not from the authority given";
+    check_submit(&address, &before.args("client"), 2, &[&address, other]);
 }
 
 /// The command ends with this exit code and a message that has all of these words.

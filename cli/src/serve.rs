@@ -61,12 +61,14 @@ pub(crate) fn master(args: &Master) -> Result<()> {
         let (master, window, serving) = horma_master::start(listener, config, shutdown.clone())?;
         if let Some(http) = http {
             let (watched, shutdown) = (Watched::Master(Box::new(window)), shutdown.clone());
+            let tls = tls.clone();
             tokio::spawn(async move { http::serve(http, tls.as_ref(), watched, shutdown).await });
         }
         let mut serving = std::pin::pin!(serving);
         tokio::select! {
             served = &mut serving => return served.map_or(Ok(()), |s| Ok(s?)),
             () = system::interrupted() => {}
+            never = tls::renew(&args.tls, Role::Master, tls.as_ref()) => match never {},
         }
         unless_again(async {
             master.drain(drain).await;
@@ -103,6 +105,7 @@ pub(crate) fn worker(args: Worker) -> Result<()> {
         let (registered, watched) = watch::channel(false);
         if let Some(http) = http {
             let (watched, leave) = (Watched::Worker(watched), leave.clone());
+            let tls = tls.clone();
             tokio::spawn(async move { http::serve(http, tls.as_ref(), watched, leave).await });
         }
         let running = horma_worker::run(listener, config, registered, leave.clone());
@@ -110,6 +113,7 @@ pub(crate) fn worker(args: Worker) -> Result<()> {
         tokio::select! {
             ran = &mut running => return Ok(ran?),
             () = system::interrupted() => leave.cancel(),
+            never = tls::renew(&args.joining.tls, Role::Worker, tls.as_ref()) => match never {},
         }
         unless_again(async { Ok(running.await?) }).await
     })

@@ -1,9 +1,12 @@
-//! The files that prove who is who, read once.
+//! The files that prove who is who: read at the start, and by a server again when they change.
 
-use std::path::Path;
+use std::convert::Infallible;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use horma_proto::Role;
 use horma_proto::tls::{BadTls, Tls};
+use tracing::{info, warn};
 
 use crate::args;
 use crate::error::{Error, Result};
@@ -11,6 +14,9 @@ use crate::error::{Error, Result};
 const CA: &str = "--tls-ca";
 const CERT: &str = "--tls-cert";
 const KEY: &str = "--tls-key";
+
+/// How often a server looks whether its files have changed.
+const LOOK: Duration = Duration::from_secs(2);
 
 /// Reads what was given; nothing if nothing was.
 pub(crate) fn load(args: &args::Tls) -> Result<Option<Tls>> {
@@ -20,6 +26,38 @@ pub(crate) fn load(args: &args::Tls) -> Result<Option<Tls>> {
 /// Reads what was given for a server of that role.
 pub(crate) fn load_as(args: &args::Tls, role: Role) -> Result<Option<Tls>> {
     checked(args, |tls| tls.expect(role))
+}
+
+/// Renews what was loaded for a server of that role when the files have changed, until it is dropped. What
+/// is no good is not taken: files that belong together are seldom replaced in one instant.
+pub(crate) async fn renew(args: &args::Tls, role: Role, tls: Option<&Tls>) -> Infallible {
+    let Some(tls) = tls else {
+        return std::future::pending().await;
+    };
+    // They may have changed since they were loaded.
+    let mut seen = None;
+    let mut ticks = tokio::time::interval(LOOK);
+    loop {
+        ticks.tick().await;
+        // Three small files.
+        let now = Some([&args.tls_ca, &args.tls_cert, &args.tls_key].map(contents));
+        if now == seen {
+            continue;
+        }
+        match load_as(args, role) {
+            Ok(newer) => {
+                newer.iter().for_each(|newer| tls.renew(newer));
+                info!(days = tls.days_left(), "certificates read");
+            }
+            Err(error) => warn!(%error, "certificates not renewed"),
+        }
+        seen = now;
+    }
+}
+
+/// What is in a file, if it can be read.
+fn contents(file: &Option<PathBuf>) -> Option<Vec<u8>> {
+    std::fs::read(file.as_ref()?).ok()
 }
 
 fn checked(

@@ -32,10 +32,11 @@ const LINGER_BYTES: usize = 1 << 16;
 
 type Accepted = std::io::Result<TlsStream<TcpStream>>;
 
-/// Connections whose handshake is done, until the stream is dropped.
+/// Connections whose handshake is done, until the stream is dropped; each is taken in by the acceptor that
+/// counts then.
 pub(crate) fn secured(
     listener: TcpListener,
-    acceptor: TlsAcceptor,
+    acceptor: impl Fn() -> TlsAcceptor + Send + 'static,
     refused: Arc<Refused>,
 ) -> ReceiverStream<Accepted> {
     let (ready, stream) = mpsc::channel(WAITING);
@@ -45,7 +46,7 @@ pub(crate) fn secured(
 
 async fn accept(
     listener: TcpListener,
-    acceptor: TlsAcceptor,
+    acceptor: impl Fn() -> TlsAcceptor,
     ready: mpsc::Sender<Accepted>,
     refused: Arc<Refused>,
 ) {
@@ -68,7 +69,7 @@ async fn accept(
                 continue;
             }
         };
-        let (acceptor, ready, refused) = (acceptor.clone(), ready.clone(), refused.clone());
+        let (acceptor, ready, refused) = (acceptor(), ready.clone(), refused.clone());
         tokio::spawn(async move {
             if let Some(stream) = handshake(socket, peer, &acceptor, &refused).await {
                 // The server may have stopped.

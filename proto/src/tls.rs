@@ -7,7 +7,7 @@
 //! read here, and nothing is trusted but the authority given.
 
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
 use tokio_rustls::rustls::client::verify_server_name;
@@ -86,19 +86,25 @@ fn words(roles: &[Role]) -> String {
     }
 }
 
-/// What a process needs to prove its roles and to have others prove theirs.
+/// What a process needs to prove its roles and to have others prove theirs. Clones are one: what one is
+/// given anew, all have, for whatever handshake comes next.
 #[derive(Clone)]
 pub struct Tls {
+    identity: Arc<RwLock<Identity>>,
+}
+
+#[derive(Clone)]
+struct Identity {
     roles: Vec<Role>,
     days: u64,
-    pub(crate) connector: TlsConnector,
-    pub(crate) acceptor: TlsAcceptor,
+    connector: TlsConnector,
+    acceptor: TlsAcceptor,
 }
 
 impl fmt::Debug for Tls {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // The rest is secret, or long.
-        f.debug_struct("Tls").field("roles", &self.roles).finish()
+        f.debug_struct("Tls").field("roles", &self.roles()).finish()
     }
 }
 
@@ -151,29 +157,58 @@ impl Tls {
             .with_client_cert_resolver(identity);
         server.alpn_protocols = vec![b"h2".to_vec()];
         client.alpn_protocols = vec![b"h2".to_vec()];
-        Ok(Self {
+        let identity = Identity {
             roles: roles(own),
             days,
             connector: TlsConnector::from(Arc::new(client)),
             acceptor: TlsAcceptor::from(Arc::new(server)),
+        };
+        Ok(Self {
+            identity: Arc::new(RwLock::new(identity)),
         })
+    }
+
+    fn identity(&self) -> Identity {
+        // Every change is a single assignment: there is no half of one to be seen.
+        let identity = self.identity.read().unwrap_or_else(PoisonError::into_inner);
+        identity.clone()
+    }
+
+    /// Goes by what another one has from now on. Connections that are open stay as they are.
+    pub fn renew(&self, newer: &Self) {
+        let newer = newer.identity();
+        let mut identity = self
+            .identity
+            .write()
+            .unwrap_or_else(PoisonError::into_inner);
+        *identity = newer;
+    }
+
+    /// Makes connections.
+    pub(crate) fn connector(&self) -> TlsConnector {
+        self.identity().connector
+    }
+
+    /// Takes them in.
+    pub(crate) fn acceptor(&self) -> TlsAcceptor {
+        self.identity().acceptor
     }
 
     /// Takes in connections of another protocol than gRPC's.
     pub(crate) fn acceptor_of(&self, protocol: &[u8]) -> TlsAcceptor {
-        let mut server = ServerConfig::clone(self.acceptor.config());
+        let mut server = ServerConfig::clone(self.acceptor().config());
         server.alpn_protocols = vec![protocol.to_vec()];
         TlsAcceptor::from(Arc::new(server))
     }
 
     /// What the certificate entitles to.
-    pub fn roles(&self) -> &[Role] {
-        &self.roles
+    pub fn roles(&self) -> Vec<Role> {
+        self.identity().roles
     }
 
     /// Whole days for which it and its authority stay valid, counted to a hundred years.
     pub fn days_left(&self) -> u64 {
-        self.days
+        self.identity().days
     }
 
     /// Whether others will take this process for one of that role: a server has to know, since nobody
@@ -182,12 +217,13 @@ impl Tls {
     /// # Errors
     /// [`BadTls::Role`].
     pub fn expect(&self, role: Role) -> Result<(), BadTls> {
-        if self.roles.contains(&role) {
+        let roles = self.roles();
+        if roles.contains(&role) {
             return Ok(());
         }
         Err(BadTls::Role {
             wanted: role,
-            found: words(&self.roles),
+            found: words(&roles),
         })
     }
 }
@@ -408,7 +444,7 @@ mod tests {
         for (names, expected) in cases {
             let (certificate, key) = issue(&authority, names, -1);
             let tls = load(&authority.pem, &certificate, &key).expect("valid");
-            assert_eq!(tls.roles, expected, "{names:?}");
+            assert_eq!(tls.roles(), expected, "{names:?}");
             for role in Role::ALL {
                 assert_eq!(tls.expect(role).is_ok(), expected.contains(&role));
             }

@@ -81,8 +81,8 @@ fn connector(
     tls: &Tls,
 ) -> impl Service<Uri, Response = Io, Error = io::Error, Future: Send> + Send + use<> {
     let address = to.uri().authority().map_or("", |a| a.as_str()).to_owned();
-    let connector = tls.connector.clone();
-    tower::service_fn(move |_| dial(address.clone(), role, connector.clone()))
+    let tls = tls.clone();
+    tower::service_fn(move |_| dial(address.clone(), role, tls.connector()))
 }
 
 type Io = TokioIo<TlsStream<TcpStream>>;
@@ -155,7 +155,8 @@ where
                 serving.await
             }
             Some(tls) => {
-                let incoming = accept::secured(listener, tls.acceptor.clone(), refused.clone());
+                let tls = tls.clone();
+                let incoming = accept::secured(listener, move || tls.acceptor(), refused.clone());
                 let incoming = limit::at_most(connections, incoming);
                 let serving = services.serve_with_incoming_shutdown(incoming, shutdown);
                 serving.await
@@ -187,7 +188,8 @@ pub type Secured = ReceiverStream<io::Result<SecuredStream>>;
 /// Connections of HTTP/1.1, from whoever proves to have a certificate, of any role.
 pub fn secured_http(listener: TcpListener, tls: &Tls) -> Secured {
     let refused = Arc::new(Refused::default());
-    accept::secured(listener, tls.acceptor_of(b"http/1.1"), refused)
+    let tls = tls.clone();
+    accept::secured(listener, move || tls.acceptor_of(b"http/1.1"), refused)
 }
 
 /// Bytes of the word by which [`answer`] is known.
@@ -213,7 +215,7 @@ pub async fn reach(
                     .await?
             }
             Some(tls) => {
-                let stream = dial(address.to_owned(), role, tls.connector.clone()).await?;
+                let stream = dial(address.to_owned(), role, tls.connector()).await?;
                 stream.into_inner().read_exact(&mut heard).await?
             }
         };
@@ -240,7 +242,7 @@ pub async fn answer(listener: &TcpListener, tls: Option<&Tls>, word: &[u8; WORD]
                     socket.read(&mut nothing).await
                 }
                 Some(tls) => {
-                    let mut stream = tls.acceptor.accept(socket).await?;
+                    let mut stream = tls.acceptor().accept(socket).await?;
                     stream.write_all(word).await?;
                     stream.flush().await?;
                     stream.read(&mut nothing).await

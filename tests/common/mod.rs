@@ -197,10 +197,14 @@ impl Process {
 
     /// Whether it has said, by now, a line that contains all of `words`.
     pub fn has_said(&mut self, words: &[&str]) -> bool {
+        self.times_said(words) > 0
+    }
+
+    /// How many such lines it has said by now.
+    pub fn times_said(&mut self, words: &[&str]) -> usize {
         self.seen.extend(self.lines.try_iter());
-        self.seen
-            .iter()
-            .any(|line| words.iter().all(|w| line.contains(w)))
+        let has = |line: &&String| words.iter().all(|w| line.contains(w));
+        self.seen.iter().filter(has).count()
     }
 
     /// Whether it has ended.

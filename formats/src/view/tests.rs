@@ -42,6 +42,7 @@ fn report() -> Report {
         warnings: vec!["</script><script>alert(1)</script>".to_owned()],
         path: PathStatistics::of(&path(), &record.counters),
         verification: None,
+        program: None,
         record,
     }
 }
