@@ -43,8 +43,11 @@ const LOOK: &str = "
         element.dispatchEvent(new Event(id === '#at' ? 'input' : 'change'));
     };
     window.here = (k) => document.querySelector('#here').children[k].lastElementChild.textContent;
+    window.shifts = [];
     new PerformanceObserver((list) => {
-        for (const entry of list.getEntries()) (window.shifts ??= []).push(entry.value);
+        for (const entry of list.getEntries()) {
+            window.shifts.push([entry.value, ...entry.sources.map(({ node }) => `${node?.nodeName}#${node?.id}`)]);
+        }
     }).observe({ type: 'layout-shift', buffered: true });";
 
 /// Runs a job on two workers and returns its page.
@@ -76,7 +79,8 @@ fn a_page_from_disk_shows_its_run() {
     let first = browser.ask("return picture()");
     let covered = number(&first["covered"]);
     assert!((0.05..0.7).contains(&covered), "{first}");
-    assert_eq!(first["red"], 0, "nothing is gouged to speak of");
+    // But for the mark where the wheel touches.
+    assert!(number(&first["red"]) < 50.0, "nothing is gouged: {first}");
     assert_eq!(browser.ask("return picture()"), first);
 
     // The slider: a position by an arrow, a turn by Page Up, and the wheel goes along.
@@ -90,7 +94,11 @@ fn a_page_from_disk_shows_its_run() {
     let moved = browser.ask("choose('#at', 9000); return picture()");
     assert_eq!(at(0), "9000");
     assert_eq!(at(1), "2.000 mm");
-    assert_eq!(at(7), "local-1, extent 0");
+    let by = at(7);
+    assert!(
+        by.as_str().is_some_and(|by| by.ends_with(", extent 0")),
+        "{by}"
+    );
     assert_ne!(moved["sum"], first["sum"]);
 
     // Every choice of colours is another picture and another map.
@@ -154,9 +162,8 @@ fn a_page_from_disk_shows_its_run() {
             "{tables}"
         );
     }
+    assert_eq!(browser.ask("return window.shifts"), json!([]));
     check_looks(&browser, "run");
-    let shifts = browser.ask("return (window.shifts ?? []).reduce((a, b) => a + b, 0)");
-    assert!(number(&shifts) < 0.02, "{shifts}");
     assert_eq!(browser.complaints(), Vec::<Value>::new());
 }
 

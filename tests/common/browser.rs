@@ -41,7 +41,8 @@ impl Browser {
             session: String::new(),
         };
         let always = ["--headless=new", "--no-sandbox", "--hide-scrollbars"];
-        let options = json!({"args": [&always[..], switches].concat()});
+        let switches = [&always[..], switches].concat();
+        let options = json!({"args": switches});
         let wanted = json!({
             "goog:chromeOptions": options,
             "goog:loggingPrefs": {"browser": "ALL"},

@@ -15,6 +15,9 @@ function firstTouch() {
   return 0;
 }
 
+// Shown all at once, so that nothing moves while the numbers come.
+$("main").hidden = false;
+
 const canvas = $("#solid");
 const picture = scene(canvas);
 if (picture) {
