@@ -13,6 +13,8 @@ use crate::post::Control;
 pub const PATH: &str = "path.csv";
 /// What was computed, by whom and how fast.
 pub const REPORT: &str = "report.json";
+/// The path as cutter locations.
+pub const APT: &str = "path.apt";
 /// The picture.
 pub const PREVIEW: &str = "preview.png";
 
@@ -54,7 +56,7 @@ pub fn program_name(control: Control, part: Option<u32>) -> String {
 
 /// Whether a run may give a file of its output directory this name.
 fn of_run(name: &str) -> bool {
-    [PATH, REPORT, PREVIEW].contains(&name) || of_program(name)
+    [PATH, REPORT, APT, PREVIEW].contains(&name) || of_program(name)
 }
 
 fn of_program(name: &str) -> bool {
