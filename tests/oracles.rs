@@ -279,11 +279,18 @@ fn foreign_rational_and_polynomial_surfaces_are_cut_as_their_closed_forms_say() 
     }
 }
 
+/// False if LinuxCNC's interpreter is missing.
+fn rs274_is_there() -> bool {
+    let there = Command::new("rs274").arg("-h").output().is_ok();
+    if !there {
+        eprintln!("skipped: rs274 is not installed; tests/run installs it where it can");
+    }
+    there
+}
+
 #[test]
 fn linuxcnc_reads_the_program_back_as_the_path() {
-    let rs274 = Command::new("rs274").arg("-h").output();
-    if rs274.is_err() {
-        eprintln!("skipped: rs274 is not installed; tests/run installs it where it can");
+    if !rs274_is_there() {
         return;
     }
     let dir = scratch();
@@ -304,6 +311,86 @@ fn linuxcnc_reads_the_program_back_as_the_path() {
             "ngc_moves.py",
             &[text(&program), text(&csv), "--feed", feed],
         );
+    }
+}
+
+const MACHINE: &str = "[machine]
+travel = { velocity = 200, acceleration = 1000 }
+attack = { velocity = 500, acceleration = 10000 }
+rotation = { acceleration = 3600 }
+turns = 60\n";
+
+#[test]
+fn linuxcnc_turns_an_axis_that_counts_to_360_the_right_way() {
+    let Some(part) = data("last_scan.stl").filter(|_| rs274_is_there()) else {
+        return;
+    };
+    let dir = scratch();
+    let program = "[program]\nfeed = 20000\nangles = \"modulo\"\nrotation = \"-A\"\n";
+    let more = format!("{AXIS}{WHEEL}{program}{MACHINE}");
+    let job = job(dir.path(), "wrapped.toml", &[&part], &more);
+    path_of(&job, dir.path(), "out", &[]);
+    let out = dir.path().join("out");
+    let (program, csv) = (out.join("path.ngc"), out.join("path.csv"));
+    ask("ngc_moves.py", &[text(&program), text(&csv), "--wrapped"]);
+}
+
+/// Each dialect, its options, its decimals, and what its reader is told.
+const DIALECTS: [(&str, &str, &str, &str); 6] = [
+    (
+        "linuxcnc",
+        "angles = \"rezero\"\nsplit = { bytes = 300000 }",
+        "4 4 4",
+        "",
+    ),
+    ("fanuc", "angles = \"modulo\"", "3 3 3", "--modulo"),
+    (
+        "siemens",
+        "angles = \"modulo\"\nattack = \"Z\"",
+        "4 4 4",
+        "--modulo --letters XZA",
+    ),
+    (
+        "mach",
+        "angles = \"rezero\"\nrotation = \"C\"",
+        "4 4 4",
+        "--letters XYC",
+    ),
+    (
+        "grblhal",
+        "angles = \"rezero\"\nsplit = { moves = 10000 }",
+        "3 3 2",
+        "",
+    ),
+    ("beckhoff", "decimals = { attack = 3 }", "4 3 4", ""),
+];
+
+#[test]
+fn a_public_parser_reads_every_dialect_back_as_the_path() {
+    let dir = scratch();
+    let mut parts = vec![(sample().with_file_name("last.step"), "")];
+    parts.extend(data("last_scan.stl").map(|part| (part, AXIS)));
+    for (part, axis) in &parts {
+        for (dialect, options, decimals, reader) in DIALECTS {
+            let program = format!("[program]\ndialect = \"{dialect}\"\nfeed = 20000\n{options}\n");
+            let more = format!("{axis}{WHEEL}{program}{MACHINE}");
+            let job = job(dir.path(), "job.toml", &[part], &more);
+            path_of(&job, dir.path(), dialect, &[]);
+            let out = dir.path().join(dialect);
+            let report = common::report(&out);
+            let files = report["program"]["files"].as_array().expect("files");
+            let files = files.iter().map(|f| out.join(f.as_str().expect("a name")));
+            let files: Vec<PathBuf> = files.collect();
+            assert_eq!(files.len() > 1, options.contains("split"), "{files:?}");
+            let csv = out.join("path.csv");
+            let mut args = vec![text(&csv)];
+            args.extend(files.iter().map(|f| text(f)));
+            args.push("--decimals");
+            args.extend(decimals.split(' ').chain(reader.split_whitespace()));
+            if !ask("dialects.py", &args) {
+                return;
+            }
+        }
     }
 }
 

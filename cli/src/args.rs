@@ -148,7 +148,7 @@ pub(crate) struct Traces {
 pub(crate) struct Run {
     #[command(flatten)]
     pub job: Job,
-    /// Directory for path.csv, path.ngc, report.json and preview.png
+    /// Directory for path.csv, the program (path.ngc), report.json and preview.png
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Worker processes on this machine; 0 computes in this process
@@ -192,7 +192,7 @@ pub(crate) struct Verify {
 pub(crate) struct Submit {
     #[command(flatten)]
     pub job: Job,
-    /// Directory for path.csv, path.ngc, report.json and preview.png
+    /// Directory for path.csv, the program (path.ngc), report.json and preview.png
     #[arg(short, long, value_name = "DIR", required_unless_present = "detach")]
     pub output: Option<PathBuf>,
     /// Print the job's number and do not wait: `horma status` and `horma fetch` take it, also after
@@ -244,7 +244,7 @@ pub(crate) struct Fetch {
     /// The job's number
     #[arg(value_name = "ID")]
     pub id: u64,
-    /// The job file (TOML): with it also path.ngc, preview.png and the verification
+    /// The job file (TOML): with it also the program, preview.png and the verification
     #[arg(value_name = "JOB")]
     pub file: Option<PathBuf>,
     /// Directory for the results
@@ -393,6 +393,21 @@ pub(crate) struct How {
         help_heading = "Instead of the job file's"
     )]
     pub path_tolerance: Option<f64>,
+    /// Whose G-code the program is: linuxcnc, fanuc, siemens, mach, grblhal or beckhoff
+    #[arg(
+        long,
+        env = "HORMA_DIALECT",
+        help_heading = "Instead of the job file's"
+    )]
+    pub dialect: Option<String>,
+    /// Most moves in one file of the program; what is more goes on in the next
+    #[arg(
+        long,
+        value_name = "MOVES",
+        env = "HORMA_SPLIT",
+        help_heading = "Instead of the job file's"
+    )]
+    pub split: Option<u32>,
     /// Feed at the contact, mm/min
     #[arg(
         long,
@@ -446,6 +461,8 @@ impl How {
             from: self.from,
             to: self.to,
             path_tolerance: self.path_tolerance,
+            dialect: self.dialect.clone(),
+            split: self.split,
             feed: self.feed,
             clearance: self.clearance,
         }

@@ -40,7 +40,7 @@ pub(crate) fn kernel(args: &BenchKernel) -> Result<()> {
 
 fn measure_and_write(args: &BenchKernel, display: &Display) -> Result<String> {
     let subject = subject(args.job.as_deref(), display)?;
-    output::prepare_dir_of(&args.output, &output::BENCH_FILES)?;
+    output::prepare_dir_of(&args.output, output::of_bench)?;
     let effort = if args.quick {
         Effort::QUICK
     } else {
@@ -48,7 +48,7 @@ fn measure_and_write(args: &BenchKernel, display: &Display) -> Result<String> {
     };
     let figures = measure::all(&subject, &effort, display)?;
     let table = table::text(&figures);
-    let staging = Staging::begin_of(&args.output, &output::BENCH_FILES)?;
+    let staging = Staging::begin_of(&args.output, output::of_bench)?;
     let write = |name, text: &str| {
         let file = staging.file(name);
         output::write(&file, |out| out.write_all(text.as_bytes()))

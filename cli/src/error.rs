@@ -115,9 +115,9 @@ impl Error {
     /// 2: the input is wrong; 3: the job cannot be done; 4: the cluster failed; 130: interrupted.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Core(e) | Self::Formats(horma_formats::Error::Core(e)) => of_core(e),
-            Self::Formats(horma_formats::Error::NoContact { .. })
-            | Self::Impossible { .. }
+            Self::Core(e) => of_core(e),
+            Self::Formats(e) if e.is_impossible() => 3,
+            Self::Impossible { .. }
             | Self::Differs { .. }
             | Self::Gouge { .. }
             | Self::MotionGouge { .. } => 3,

@@ -5,6 +5,7 @@
 mod args;
 mod error;
 
+mod program;
 mod run;
 
 mod client;

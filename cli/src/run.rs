@@ -10,7 +10,7 @@ use horma_core::{Counters, Method, Part, Phase, Position, Simd, ToolPath, Verifi
 use horma_formats::job::{self, JobFile, Overrides};
 use horma_formats::output::Staging;
 use horma_formats::report::{self, PathStatistics, Report};
-use horma_formats::{csv, gcode, output, part, preview};
+use horma_formats::{csv, output, part, preview};
 use horma_master::{Outcome, Progress};
 use horma_proto::{VERSION, trace};
 use tokio_util::sync::CancellationToken;
@@ -22,7 +22,7 @@ use crate::cluster::Workers;
 use crate::error::{Error, Result};
 use crate::progress::Display;
 use crate::serve::{NOTICE, runtime};
-use crate::{cluster, here, say, submit, system, verify};
+use crate::{cluster, here, program, say, submit, system, verify};
 
 /// A job and where its results go.
 struct Asked<'a> {
@@ -157,6 +157,7 @@ fn fetch_alone(remote: &Remote, id: u64, wait: bool, output: &Path, quiet: bool)
         warnings: Vec::new(),
         path: PathStatistics::of(&path, &record.counters),
         verification: None,
+        program: None,
         record,
     };
     let staging = Staging::begin(output)?;
@@ -262,6 +263,7 @@ fn perform(
             warnings,
             path: PathStatistics::of(&path, &record.counters),
             verification,
+            program: None,
             record,
         };
         let writing = || write(asked, &file, &part, &path, report, &display, &stop);
@@ -319,14 +321,16 @@ fn write(
         ("cutter", &described(&report.job["cutter"])),
     ];
     // The picture takes about as long as the rest.
-    let drawn = thread::scope(|scope| {
+    let (drawn, written) = thread::scope(|scope| {
         let drawing = scope.spawn(|| preview::save(&staging.file(output::PREVIEW), part, path));
-        gcode::save(&staging.file(output::PROGRAM), path, file.program, &heading)?;
+        let written = program::write(staging.dir(), path, file, &heading)?;
         going_on()?;
         csv::save(&staging.file(output::PATH), path)?;
-        Ok::<_, Error>(drawing.join().unwrap_or_else(|panic| resume_unwind(panic)))
+        let drawn = drawing.join().unwrap_or_else(|panic| resume_unwind(panic));
+        Ok::<_, Error>((drawn, written))
     })?;
     going_on()?;
+    report.program = Some(written);
     // Nobody turns a picture: a path without one is as good.
     if let Err(error) = drawn {
         let warning = format!("there is no picture: {error}");
@@ -390,12 +394,20 @@ fn summarize(dir: &Path, report: &Report) {
             "\n{n} straight moves stray farther than the path tolerance: there the height jumps"
         ),
     };
+    let (cutting, programs) = report.program.as_ref().map_or_else(Default::default, |p| {
+        let names = [
+            p.files.first(),
+            p.files.last().filter(|_| p.files.len() > 1),
+        ];
+        let names = names.into_iter().flatten().map(|name| dir.join(name));
+        let names: Vec<String> = names.map(|n| n.display().to_string()).collect();
+        (program::describe(p), names.join(" to "))
+    });
     say(&format!(
-        "{} positions{inserted}, {} without contact{beyond}{lost}{window}{verification}\n{}\n{}\n{}\n{}",
+        "{} positions{inserted}, {} without contact{beyond}{lost}{window}{verification}\n{cutting}\n{}\n{programs}\n{}\n{}",
         path.positions,
         path.without_contact,
         dir.join(output::PATH).display(),
-        dir.join(output::PROGRAM).display(),
         dir.join(output::REPORT).display(),
         dir.join(output::PREVIEW).display(),
     ));

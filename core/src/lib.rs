@@ -50,15 +50,20 @@ mod digitize;
 
 mod path;
 
+mod course;
+mod feed;
+
 mod verify;
 
 mod record;
 
+pub use course::{MachineAxis, Station, course};
 pub use cutter::Cutter;
 pub use digitize::{Digitizer, Heuristic};
 pub use discretize::{Model, discretize};
 pub use error::{Error, Result};
 pub use extent::{Extent, Halo};
+pub use feed::{AxisLimits, Bound, Limits, Peak, Steady, Timing, peaks, steady, timing};
 pub use grid::SurfaceGrid;
 pub use job::{Contact, Culling, Discretization, Distribution, Job, Local, Method};
 pub use job::{Sharing, Window};

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::job::Place;
 use crate::part::Format;
+use crate::post::Spot;
 
 /// What is wrong with a file that was read or written.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +56,64 @@ pub enum Error {
     NoContact {
         /// Number of positions.
         positions: u64,
+    },
+    /// A position with more digits than a control's numbers have.
+    #[error(
+        "{axis} at {spot} is beyond the {limit} that {control} can be told with {decimals} decimals; ask for fewer (decimals in [program]), or for the rotation choose other angles, such as \"rezero\" and split"
+    )]
+    TooManyDigits {
+        /// The axis.
+        axis: &'static str,
+        /// Its decimals.
+        decimals: u8,
+        /// Farthest that can be told, in the program's units.
+        limit: f64,
+        /// The control.
+        control: &'static str,
+        /// The place.
+        spot: Spot,
+    },
+    /// A move along which F counts nothing.
+    #[error(
+        "after {spot} nothing that F counts moves, so that it cannot tell how fast; choose feed_mode = \"inverse\" in [program], or more decimals"
+    )]
+    NoFeed {
+        /// Where the move begins.
+        spot: Spot,
+    },
+    /// A program in more files than can be numbered.
+    #[error("the program takes more than {limit} files; let each hold more (split in [program])")]
+    TooManyFiles {
+        /// Most files.
+        limit: u32,
+    },
+    /// A position that an axis does not reach.
+    #[error(
+        "{axis} goes to {value:.4} mm at {spot}, but its range in [machine] is from {least} to {most}; move the part, or change the motion"
+    )]
+    OutsideTravel {
+        /// The axis.
+        axis: &'static str,
+        /// Where it should go, mm.
+        value: f64,
+        /// Least that it reaches, mm.
+        least: f64,
+        /// Most that it reaches, mm.
+        most: f64,
+        /// The place.
+        spot: Spot,
+    },
+    /// A retract that the attack axis does not reach.
+    #[error(
+        "attack retracts to {value:.4} mm, but its range in [machine] is from {least} to {most}; ask for less clearance in [program]"
+    )]
+    RetractOutside {
+        /// Where it should go, mm.
+        value: f64,
+        /// Least that it reaches, mm.
+        least: f64,
+        /// Most that it reaches, mm.
+        most: f64,
     },
     /// The numbers of a part or of a job contradict each other or are out of bounds.
     #[error(transparent)]
@@ -233,6 +292,22 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
+    /// Whether a path is what is wrong: the input makes sense, but no program comes of it.
+    pub fn is_impossible(&self) -> bool {
+        match self {
+            Self::Core(error) => error.is_impossible(),
+            error => matches!(
+                error,
+                Self::NoContact { .. }
+                    | Self::TooManyDigits { .. }
+                    | Self::NoFeed { .. }
+                    | Self::TooManyFiles { .. }
+                    | Self::OutsideTravel { .. }
+                    | Self::RetractOutside { .. }
+            ),
+        }
+    }
+
     /// The operating system's refusal, with the file it is about.
     pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
         Self::Io {

@@ -7,7 +7,9 @@
 
 mod digitizing;
 mod echo;
+mod machine;
 mod place;
+mod program;
 mod raw;
 
 use std::fs;
@@ -18,9 +20,11 @@ use horma_core::{
     MotionKind, Point, Sharing, unit,
 };
 
+pub use self::machine::Machine;
 pub use self::place::Place;
 use self::raw::{At, Given, RawAxis, RawCutter, RawJob};
 use crate::error::{Error, Result};
+use crate::post::Program;
 
 /// Chordal tolerance of a job that does not say, mm.
 pub const DEFAULT_TOLERANCE: f64 = 0.01;
@@ -47,8 +51,10 @@ pub struct JobFile {
     pub job: Job,
     /// Where to compute it.
     pub cluster: Cluster,
-    /// How to run it on the machine.
+    /// How to write it for the machine.
     pub program: Program,
+    /// What the machine can do.
+    pub machine: Machine,
 }
 
 /// Where a job is computed.
@@ -58,15 +64,6 @@ pub struct Cluster {
     pub workers: u32,
     /// How it is shared among them.
     pub sharing: Sharing,
-}
-
-/// How the path is run on the machine.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Program {
-    /// Feed at the contact, mm/min.
-    pub feed: f64,
-    /// How far above the highest position the cutter retracts, mm.
-    pub clearance: f64,
 }
 
 /// What flags and environment variables put in the place of the job file's values.
@@ -100,6 +97,10 @@ pub struct Overrides {
     pub to: Option<f64>,
     /// `motion.path_tolerance`, mm
     pub path_tolerance: Option<f64>,
+    /// `program.dialect`
+    pub dialect: Option<String>,
+    /// `program.split`, moves
+    pub split: Option<u32>,
     /// `program.feed`, mm/min
     pub feed: Option<f64>,
     /// `program.clearance`, mm
@@ -144,6 +145,7 @@ pub fn parse(text: &str, path: &Path, overrides: &Overrides) -> Result<JobFile> 
         job,
         cluster,
         program: source.program(&raw)?,
+        machine: source.machine(&raw)?,
     })
 }
 
@@ -347,35 +349,23 @@ impl Source<'_> {
         })
     }
 
-    fn program(&self, raw: &RawJob) -> Result<Program> {
-        let raw = &raw.program;
-        let number =
-            |given: &Option<Given<f64>>, key, default, least: &str, ok: fn(f64) -> bool| {
-                let Some(given) = given else {
-                    return Ok(default);
-                };
-                if given.value.is_finite() && ok(given.value) {
-                    return Ok(given.value);
-                }
-                let what = format!("{key} is {}, but must be {least}", given.value);
-                Err(self.wrong(Some(&given.at), what))
-            };
-        Ok(Program {
-            feed: number(
-                &raw.feed,
-                "feed",
-                DEFAULT_FEED,
-                "greater than 0 and at most 1000000 mm/min",
-                |v| v > 0.0 && v <= 1.0e6,
-            )?,
-            clearance: number(
-                &raw.clearance,
-                "clearance",
-                DEFAULT_CLEARANCE,
-                "from 0 to 10000 mm",
-                |v| (0.0..=1.0e4).contains(&v),
-            )?,
-        })
+    /// A number within its bounds, or the default.
+    fn number(
+        &self,
+        given: Option<&Given<f64>>,
+        key: &str,
+        default: f64,
+        bound: &str,
+        ok: fn(f64) -> bool,
+    ) -> Result<f64> {
+        let Some(given) = given else {
+            return Ok(default);
+        };
+        if given.value.is_finite() && ok(given.value) {
+            return Ok(given.value);
+        }
+        let what = format!("{key} is {}, but must be {bound}", given.value);
+        Err(self.wrong(Some(&given.at), what))
     }
 
     fn required<'v, S, T>(

@@ -16,8 +16,8 @@ mod decimal;
 pub mod output;
 
 pub mod csv;
-pub mod gcode;
 pub mod plot;
+pub mod post;
 pub mod preview;
 pub mod report;
 

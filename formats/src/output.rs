@@ -7,20 +7,15 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use crate::error::{Error, Result};
+use crate::post::Control;
 
-/// Every name that a run may give a file of its output directory.
-pub const FILES: [&str; 4] = [PATH, REPORT, PROGRAM, PREVIEW];
 /// The tool path.
 pub const PATH: &str = "path.csv";
 /// What was computed, by whom and how fast.
 pub const REPORT: &str = "report.json";
-/// The program for the machine.
-pub const PROGRAM: &str = "path.ngc";
 /// The picture.
 pub const PREVIEW: &str = "preview.png";
 
-/// Every name that a bench of the kernel may give a file of its output directory.
-pub const BENCH_FILES: [&str; 3] = [BENCH_TABLE, BENCH_FIGURES, BENCH_PLOT];
 /// The bench's table.
 pub const BENCH_TABLE: &str = "kernel.txt";
 /// The bench's figures.
@@ -28,10 +23,8 @@ pub const BENCH_FIGURES: &str = "kernel.json";
 /// The bench's diagram.
 pub const BENCH_PLOT: &str = "kernel.svg";
 
-/// Every name that a bench of clusters may give a file of its output directory.
-pub const SCALING_FILES: [&str; 10] = [
-    SCALING_TABLE,
-    SCALING_FIGURES,
+/// Diagrams of a bench of clusters.
+const SCALING_PLOTS: [&str; 8] = [
     "rows.svg",
     "bytes.svg",
     "time-exact.svg",
@@ -41,13 +34,51 @@ pub const SCALING_FILES: [&str; 10] = [
     "projection-exact.svg",
     "projection-brute.svg",
 ];
-/// Its tables.
+/// Tables of a bench of clusters.
 pub const SCALING_TABLE: &str = "scaling.md";
 /// Every run in figures.
 pub const SCALING_FIGURES: &str = "scaling.csv";
 
 /// Begins the name of a file that is still being written.
 const UNFINISHED: &str = ".horma-";
+
+/// The program for the machine, one file or `part` of several; without hyphens, which not every control
+/// takes.
+pub fn program_name(control: Control, part: Option<u32>) -> String {
+    let extension = control.dialect().extension;
+    match part {
+        None => format!("path.{extension}"),
+        Some(part) => format!("path_{part:04}.{extension}"),
+    }
+}
+
+/// Whether a run may give a file of its output directory this name.
+fn of_run(name: &str) -> bool {
+    [PATH, REPORT, PREVIEW].contains(&name) || of_program(name)
+}
+
+fn of_program(name: &str) -> bool {
+    let parts = name.strip_prefix("path").and_then(|n| n.split_once('.'));
+    parts.is_some_and(|(part, extension)| {
+        let digits = part.strip_prefix('_').unwrap_or("0000");
+        Control::ALL
+            .iter()
+            .any(|c| c.dialect().extension == extension)
+            && (part.is_empty() || part.starts_with('_'))
+            && digits.len() == 4
+            && digits.bytes().all(|c| c.is_ascii_digit())
+    })
+}
+
+/// Whether a bench of the kernel may give a file of its output directory this name.
+pub fn of_bench(name: &str) -> bool {
+    [BENCH_TABLE, BENCH_FIGURES, BENCH_PLOT].contains(&name)
+}
+
+/// Whether a bench of clusters may give a file of its output directory this name.
+pub fn of_scaling(name: &str) -> bool {
+    [SCALING_TABLE, SCALING_FIGURES].contains(&name) || SCALING_PLOTS.contains(&name)
+}
 
 /// Makes `dir` ready for results: creates it if it is missing, else checks that it is writable and
 /// holds nothing but the results of an earlier run.
@@ -56,14 +87,14 @@ const UNFINISHED: &str = ".horma-";
 /// [`Error::NotADirectory`], [`Error::ForeignDirectory`] if it holds anything else, [`Error::Io`]
 /// if it cannot be created, read or written.
 pub fn prepare_dir(dir: &Path) -> Result<()> {
-    prepare_dir_of(dir, &FILES)
+    prepare_dir_of(dir, of_run)
 }
 
-/// The same for results of these names.
+/// The same for results of `our` names.
 ///
 /// # Errors
 /// Those of [`prepare_dir`].
-pub fn prepare_dir_of(dir: &Path, files: &[&str]) -> Result<()> {
+pub fn prepare_dir_of(dir: &Path, our: fn(&str) -> bool) -> Result<()> {
     let io = |source| Error::io(dir, source);
     if dir.exists() && !dir.is_dir() {
         return Err(Error::NotADirectory {
@@ -74,7 +105,7 @@ pub fn prepare_dir_of(dir: &Path, files: &[&str]) -> Result<()> {
     for entry in fs::read_dir(dir).map_err(io)? {
         let name = entry.map_err(io)?.file_name();
         let name = name.to_string_lossy();
-        if !files.contains(&&*name) && !name.starts_with(UNFINISHED) {
+        if !our(&name) && !name.starts_with(UNFINISHED) {
             return Err(Error::ForeignDirectory {
                 path: dir.to_owned(),
                 entry: name.into_owned(),
@@ -89,7 +120,7 @@ pub fn prepare_dir_of(dir: &Path, files: &[&str]) -> Result<()> {
 /// are published, all at once.
 #[derive(Debug)]
 pub struct Staging {
-    files: &'static [&'static str],
+    our: fn(&str) -> bool,
     dir: PathBuf,
     staged: TempDir,
 }
@@ -100,26 +131,31 @@ impl Staging {
     /// # Errors
     /// [`Error::Io`] if nothing can be created there.
     pub fn begin(dir: &Path) -> Result<Self> {
-        Self::begin_of(dir, &FILES)
+        Self::begin_of(dir, of_run)
     }
 
-    /// Begins results of these names for `dir`.
+    /// Begins results of `our` names for `dir`.
     ///
     /// # Errors
     /// [`Error::Io`] if nothing can be created there.
-    pub fn begin_of(dir: &Path, files: &'static [&'static str]) -> Result<Self> {
+    pub fn begin_of(dir: &Path, our: fn(&str) -> bool) -> Result<Self> {
         let mut builder = tempfile::Builder::new();
         let staged = builder.prefix(UNFINISHED).tempdir_in(dir);
         Ok(Self {
-            files,
+            our,
             dir: dir.to_owned(),
             staged: staged.map_err(|source| Error::io(dir, source))?,
         })
     }
 
+    /// Where results are written.
+    pub fn dir(&self) -> &Path {
+        self.staged.path()
+    }
+
     /// Where to write the result called `name`, one of those that were begun.
     pub fn file(&self, name: &str) -> PathBuf {
-        self.staged.path().join(name)
+        self.dir().join(name)
     }
 
     /// Moves every result to its place. What an earlier run left there and this one did not write
@@ -128,50 +164,59 @@ impl Staging {
     /// # Errors
     /// [`Error::Io`], naming the file.
     pub fn publish(self) -> Result<()> {
-        for name in self.files {
+        let staged = names(self.dir()).map_err(|e| Error::io(self.dir(), e))?;
+        for name in &staged {
             let target = self.dir.join(name);
-            let moved = match self.file(name) {
-                staged if staged.exists() => fs::rename(staged, &target),
-                _ => fs::remove_file(&target),
-            };
-            match moved {
-                Err(e) if e.kind() != io::ErrorKind::NotFound => {
-                    return Err(Error::io(&target, e));
-                }
-                _ => {}
-            }
+            fs::rename(self.file(name), &target).map_err(|e| Error::io(&target, e))?;
+        }
+        let there = names(&self.dir).map_err(|e| Error::io(&self.dir, e))?;
+        for stale in there
+            .iter()
+            .filter(|n| (self.our)(n) && !staged.contains(n))
+        {
+            let stale = self.dir.join(stale);
+            fs::remove_file(&stale).map_err(|e| Error::io(&stale, e))?;
         }
         Ok(())
     }
+}
+
+/// The names in a directory, in order.
+fn names(dir: &Path) -> io::Result<Vec<String>> {
+    let names = fs::read_dir(dir)?;
+    let names = names.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
+    let mut names: Vec<String> = names.collect::<io::Result<_>>()?;
+    names.sort();
+    Ok(names)
 }
 
 /// Writes `file` with `contents`: into a file beside it that takes its name once it is whole.
 ///
 /// # Errors
 /// [`Error::Io`], naming `file`; nothing is left behind.
-pub fn write(
+pub fn write<T>(
     file: &Path,
-    contents: impl FnOnce(&mut BufWriter<&mut fs::File>) -> io::Result<()>,
-) -> Result<()> {
+    contents: impl FnOnce(&mut BufWriter<&mut fs::File>) -> io::Result<T>,
+) -> Result<T> {
     replace(file, contents).map_err(|source| Error::io(file, source))
 }
 
-fn replace(
+fn replace<T>(
     file: &Path,
-    contents: impl FnOnce(&mut BufWriter<&mut fs::File>) -> io::Result<()>,
-) -> io::Result<()> {
+    contents: impl FnOnce(&mut BufWriter<&mut fs::File>) -> io::Result<T>,
+) -> io::Result<T> {
     let dir = match file.parent() {
         Some(dir) if dir != Path::new("") => dir,
         _ => Path::new("."),
     };
     let mut beside = unfinished(dir)?;
     let mut out = BufWriter::new(beside.as_file_mut());
-    contents(&mut out)?;
+    let made = contents(&mut out)?;
     out.flush()?;
     drop(out);
     beside.as_file().sync_all()?;
     beside.persist(file)?;
-    Ok(())
+    Ok(made)
 }
 
 /// A file in `dir` that vanishes unless it is given a name.
@@ -197,12 +242,7 @@ mod tests {
     use super::*;
 
     fn names(dir: &Path) -> Vec<String> {
-        let entries = fs::read_dir(dir).expect("readable");
-        let mut names: Vec<_> = entries
-            .map(|e| e.expect("entry").file_name().to_string_lossy().into_owned())
-            .collect();
-        names.sort();
-        names
+        super::names(dir).expect("readable")
     }
 
     #[test]
@@ -212,7 +252,7 @@ mod tests {
         write(&file, |out| out.write_all(b"first")).expect("writable");
         let broken = write(&file, |out| {
             out.write_all(b"sec")?;
-            Err(io::Error::other("the pen broke"))
+            Err::<(), _>(io::Error::other("the pen broke"))
         });
         let message = broken.expect_err("broken").to_string();
         assert!(
@@ -240,7 +280,14 @@ mod tests {
         let scratch = tempfile::tempdir().expect("scratch");
         let dir = scratch.path().join("new/deep");
         prepare_dir(&dir).expect("created");
-        for name in FILES {
+        let old = [
+            "path.csv",
+            "report.json",
+            "path.ngc",
+            "path_0001.mpf",
+            "path_0002.mpf",
+        ];
+        for name in old {
             fs::write(dir.join(name), "").expect("writable");
         }
         fs::write(dir.join(".horma-killed"), "").expect("writable");
@@ -256,6 +303,23 @@ mod tests {
         staging.publish().expect("movable");
         assert_eq!(names(&dir), [".horma-killed", PATH, REPORT]);
         assert_eq!(fs::read(dir.join(PATH)).expect("there"), b"new");
+    }
+
+    #[test]
+    fn programs_are_known_by_their_names() {
+        for control in Control::ALL {
+            assert!(of_run(&program_name(control, None)));
+            assert!(of_run(&program_name(control, Some(17))));
+        }
+        for foreign in [
+            "path.txt",
+            "path_1.ngc",
+            "path_00001.ngc",
+            "path-0001.ngc",
+            "pathology.nc",
+        ] {
+            assert!(!of_run(foreign), "{foreign}");
+        }
     }
 
     #[test]

@@ -5,12 +5,15 @@
 use std::io::Write;
 use std::path::Path;
 
-use horma_core::{Counters, Record, ToolPath, Verification};
+use horma_core::{
+    Bound, Counters, MachineAxis, Record, Station, Steady, Timing, ToolPath, Verification, peaks,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::error::Result;
 use crate::output;
+use crate::post::Program;
 
 /// A run's report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -25,6 +28,8 @@ pub struct Report {
     pub path: PathStatistics,
     /// How the path compares with the designed surface; nothing if that was skipped.
     pub verification: Option<Verification>,
+    /// The program for the machine; nothing if none was written.
+    pub program: Option<ProgramStatistics>,
     /// Phases, bodies, counters, workers, extents and lost attempts, each under its own key.
     #[serde(flatten)]
     pub record: Record,
@@ -65,6 +70,103 @@ impl PathStatistics {
             lowest: heights().reduce(f64::min),
             highest: heights().reduce(f64::max),
         }
+    }
+}
+
+/// A program in figures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProgramStatistics {
+    /// Whose dialect.
+    pub dialect: String,
+    /// Its files, in the order in which they are run.
+    pub files: Vec<String>,
+    /// How long the cutter is at work, s: from the first position to the last.
+    pub seconds: f64,
+    /// What keeps moves from being shorter, with the share of the moves that it holds; the greatest first.
+    pub bounds: Vec<(String, f64)>,
+    /// The most that is asked of each axis.
+    pub peaks: Vec<AxisPeak>,
+    /// The same path at the greatest steady speed of the spindle within the same limits; nothing if the
+    /// part does not turn all the time.
+    pub steady: Option<SteadySpindle>,
+}
+
+/// The most that is asked of an axis, in mm or degrees, and seconds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AxisPeak {
+    /// Its name.
+    pub axis: String,
+    /// Greatest velocity.
+    pub velocity: f64,
+    /// Greatest acceleration: the difference of two moves' velocities over the mean of their durations.
+    pub acceleration: f64,
+    /// Greatest jerk: the difference of the accelerations at a move's ends over its duration.
+    pub jerk: f64,
+}
+
+/// A path at a steady speed of the spindle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SteadySpindle {
+    /// Turns a minute.
+    pub turns: f64,
+    /// How long the path then takes, s.
+    pub seconds: f64,
+}
+
+impl ProgramStatistics {
+    /// Of a program in these files, that runs these stations in that time.
+    pub fn of(
+        program: &Program,
+        files: Vec<String>,
+        stations: &[Station],
+        timing: &Timing,
+        steady: Option<Steady>,
+    ) -> Self {
+        let peaks = MachineAxis::ALL
+            .into_iter()
+            .zip(peaks(stations, &timing.durations));
+        let peaks = peaks.map(|(axis, peak)| AxisPeak {
+            axis: axis.name().to_owned(),
+            velocity: peak.velocity,
+            acceleration: peak.acceleration,
+            jerk: peak.jerk,
+        });
+        Self {
+            dialect: program.control.dialect().name.to_owned(),
+            files,
+            seconds: timing.durations.iter().sum(),
+            bounds: shares(&timing.bounds),
+            peaks: peaks.collect(),
+            steady: steady.map(|s| SteadySpindle {
+                turns: s.velocity / 6.0,
+                seconds: s.seconds,
+            }),
+        }
+    }
+}
+
+/// The share of each bound, the greatest first.
+fn shares(bounds: &[Bound]) -> Vec<(String, f64)> {
+    let mut counted: Vec<(Bound, u64)> = Vec::new();
+    for bound in bounds {
+        match counted.iter_mut().find(|(b, _)| b == bound) {
+            Some((_, count)) => *count += 1,
+            None => counted.push((*bound, 1)),
+        }
+    }
+    counted.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    let share = |count: u64| count as f64 / bounds.len() as f64;
+    let named = counted.into_iter().map(|(b, n)| (name_of(b), share(n)));
+    named.collect()
+}
+
+fn name_of(bound: Bound) -> String {
+    match bound {
+        Bound::Feed => "feed".to_owned(),
+        Bound::Shortest => "shortest move of the control".to_owned(),
+        Bound::Velocity(axis) => format!("{} velocity", axis.name()),
+        Bound::Acceleration(axis) => format!("{} acceleration", axis.name()),
+        Bound::Jerk(axis) => format!("{} jerk", axis.name()),
     }
 }
 
@@ -130,6 +232,15 @@ mod tests {
     }
 
     #[test]
+    fn what_bounds_most_moves_comes_first() {
+        let attack = Bound::Acceleration(MachineAxis::Attack);
+        let found = shares(&[Bound::Feed, attack, attack, Bound::Shortest, attack]);
+        assert_eq!(found[0], ("attack acceleration".to_owned(), 0.6));
+        assert_eq!(found.len(), 3);
+        assert_eq!(shares(&[]), []);
+    }
+
+    #[test]
     fn a_report_reads_back() {
         let dir = tempfile::tempdir().expect("scratch");
         let file = dir.path().join(output::REPORT);
@@ -139,6 +250,7 @@ mod tests {
             warnings: vec!["last.stl: 3 edges are open".to_owned()],
             path: PathStatistics::of(&path(), &Counters::default()),
             verification: None,
+            program: None,
             record: Record {
                 phases: vec![Phase {
                     name: "digitize".to_owned(),

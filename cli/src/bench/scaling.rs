@@ -59,7 +59,7 @@ fn measure_and_write(args: &BenchScaling, display: &Display) -> Result<String> {
         ..Overrides::default()
     };
     let (file, name, part) = super::read(args.job.as_deref(), &overrides, display)?;
-    output::prepare_dir_of(&args.output, &output::SCALING_FILES)?;
+    output::prepare_dir_of(&args.output, output::of_scaling)?;
     let load = system::load();
     let cases = cases(args, file.job);
     let runtime = runtime()?;
@@ -163,7 +163,7 @@ fn write(args: &BenchScaling, experiment: &Experiment) -> Result<String> {
         .map(|(name, plot)| (name.as_str(), plot.title.as_str()))
         .collect();
     let tables = tables::markdown(experiment, &summaries, &fitted, &projections, &shown);
-    let staging = Staging::begin_of(&args.output, &output::SCALING_FILES)?;
+    let staging = Staging::begin_of(&args.output, output::of_scaling)?;
     let write = |name: &str, text: &str| {
         output::write(&staging.file(name), |out| out.write_all(text.as_bytes()))
     };

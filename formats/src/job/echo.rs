@@ -1,9 +1,12 @@
 //! A job as values again, for the report.
 
-use horma_core::{Axis, Cutter, Discretization, Job, Local, Method};
-use serde_json::{Value, json};
+use horma_core::{Axis, Cutter, Discretization, Job, Local, MachineAxis, Method};
+use serde_json::{Map, Value, json};
 
+use super::machine::{LIMITS, Machine};
+use super::program::{ANGLES, FEED_MODES, POINTS, UNITS};
 use super::{CONTACTS, JobFile, KINDS};
+use crate::post::{Program, Split};
 
 impl JobFile {
     /// The job in effect, keyed as a job file is, for the report.
@@ -38,7 +41,8 @@ impl JobFile {
                 "distribution": self.cluster.sharing.distribution.name(),
                 "extents_per_worker": self.cluster.sharing.extents_per_worker,
             },
-            "program": { "feed": self.program.feed, "clearance": self.program.clearance },
+            "program": program_echo(&self.program),
+            "machine": machine_echo(&self.machine),
         })
     }
 }
@@ -94,7 +98,54 @@ fn cutter_echo(cutter: &Cutter) -> Value {
     }
 }
 
-fn name_of<T: PartialEq>(known: &[(&'static str, T)], value: &T) -> &'static str {
+fn program_echo(program: &Program) -> Value {
+    let [travel, attack, rotation] = program
+        .words
+        .map(|w| format!("{}{}", if w.negative { "-" } else { "" }, w.letter));
+    let decimals = program.decimals;
+    json!({
+        "dialect": program.control.dialect().name,
+        "travel": travel,
+        "attack": attack,
+        "rotation": rotation,
+        "units": name_of(&UNITS, &program.units),
+        "point": name_of(&POINTS, &program.point),
+        "decimals": { "travel": decimals[0], "attack": decimals[1], "rotation": decimals[2] },
+        "angles": name_of(&ANGLES, &program.angles),
+        "feed_mode": name_of(&FEED_MODES, &program.feed_mode),
+        "split": program.split.map(|split| match split {
+            Split::Bytes(most) => json!({ "bytes": most }),
+            Split::Moves(most) => json!({ "moves": most }),
+        }),
+        "block_numbers": program.block_numbers,
+        "feed": program.feed,
+        "clearance": program.clearance,
+    })
+}
+
+/// What is known of the machine, and nothing of what is not.
+fn machine_echo(machine: &Machine) -> Value {
+    let mut echo = Map::new();
+    for axis in MachineAxis::ALL {
+        let limits = LIMITS.into_iter().zip(machine.axes[axis as usize]);
+        let limits = limits.filter_map(|(key, value)| Some((key, json!(value?))));
+        let range = machine.ranges.get(axis as usize).cloned().flatten();
+        let range = range.map(|r| ("range", json!([r.start(), r.end()])));
+        let all = limits
+            .chain(range)
+            .map(|(key, value)| (key.to_owned(), value));
+        let all: Map<String, Value> = all.collect();
+        if !all.is_empty() {
+            echo.insert(axis.name().to_owned(), all.into());
+        }
+    }
+    if let Some(turns) = machine.turns {
+        echo.insert("turns".to_owned(), json!(turns));
+    }
+    echo.into()
+}
+
+pub(super) fn name_of<T: PartialEq>(known: &[(&'static str, T)], value: &T) -> &'static str {
     let named = known.iter().find(|(_, v)| v == value);
     named.map_or("", |(name, _)| name)
 }

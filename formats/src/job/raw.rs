@@ -62,6 +62,8 @@ pub(super) struct RawJob {
     pub(super) cluster: RawCluster,
     #[serde(default)]
     pub(super) program: RawProgram,
+    #[serde(default)]
+    pub(super) machine: RawMachine,
 }
 
 #[derive(Debug, Deserialize)]
@@ -137,8 +139,65 @@ pub(super) struct RawCluster {
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawProgram {
+    pub(super) dialect: Option<Given<String>>,
+    pub(super) travel: Option<Given<String>>,
+    pub(super) attack: Option<Given<String>>,
+    pub(super) rotation: Option<Given<String>>,
+    pub(super) units: Option<Given<String>>,
+    pub(super) point: Option<Given<String>>,
+    pub(super) decimals: Option<Given<RawDecimals>>,
+    pub(super) angles: Option<Given<String>>,
+    pub(super) feed_mode: Option<Given<String>>,
+    pub(super) split: Option<Given<RawSplit>>,
+    pub(super) block_numbers: Option<Given<i64>>,
     pub(super) feed: Option<Given<f64>>,
     pub(super) clearance: Option<Given<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawDecimals {
+    pub(super) travel: Option<Given<i64>>,
+    pub(super) attack: Option<Given<i64>>,
+    pub(super) rotation: Option<Given<i64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawSplit {
+    pub(super) bytes: Option<Given<i64>>,
+    pub(super) moves: Option<Given<i64>>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawMachine {
+    pub(super) travel: Option<Given<RawAxisLimits>>,
+    pub(super) attack: Option<Given<RawAxisLimits>>,
+    pub(super) rotation: Option<Given<RawAxisLimits>>,
+    pub(super) turns: Option<Given<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawAxisLimits {
+    pub(super) range: Option<Given<[f64; 2]>>,
+    pub(super) velocity: Option<Given<f64>>,
+    pub(super) acceleration: Option<Given<f64>>,
+    pub(super) jerk: Option<Given<f64>>,
+}
+
+impl From<u32> for RawSplit {
+    /// As a flag says it.
+    fn from(moves: u32) -> Self {
+        Self {
+            bytes: None,
+            moves: Some(Given {
+                value: moves.into(),
+                at: At::Flag("split"),
+            }),
+        }
+    }
 }
 
 impl RawCutter {
@@ -184,6 +243,8 @@ impl RawJob {
         put(&mut self.digitizing.delta_u, "delta_u", &by.delta_u);
         put(&mut self.digitizing.delta_v, "delta_v", &by.delta_v);
         put(&mut self.digitizing.fallback, "fallback", &by.fallback);
+        put(&mut self.program.dialect, "dialect", &by.dialect);
+        put(&mut self.program.split, "split", &by.split);
         put(&mut self.program.feed, "feed", &by.feed);
         put(&mut self.program.clearance, "clearance", &by.clearance);
         if by.tolerance.is_some() {

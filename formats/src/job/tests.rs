@@ -1,4 +1,7 @@
+use horma_core::AxisLimits;
+
 use super::*;
+use crate::post::{Angles, Control, FeedMode, Programmed, Split, Units};
 
 const JOB: &str = r#"[part]
 files = ["last.step", "/abs/holder.stl"]
@@ -168,6 +171,16 @@ fn numbers_out_of_bounds_are_refused_at_their_key() {
         "feed is 0, but must be greater than 0",
     );
     refused("clearance = 5", "clearance = -1", "clearance is -1");
+    let split = "clearance = 5\nsplit = { moves = 0 }";
+    refused("clearance = 5", split, "a file must hold at least 1");
+    let split = "clearance = 5\nsplit = { bytes = 9999 }";
+    refused("clearance = 5", split, "a file must hold at least 10000");
+    let step = "clearance = 5\nblock_numbers = 2000";
+    refused("clearance = 5", step, "must go by 1000 at most");
+    for decimals in ["travel = 0", "attack = 7", "rotation = -1"] {
+        let decimals = format!("clearance = 5\ndecimals = {{ {decimals} }}");
+        refused("clearance = 5", &decimals, "but must be from 1 to 6");
+    }
     refused("[1, 0, 0]", "[0, 0, 0]", "which has no length");
     refused("[0, 0, 14]", "[0, nan, 14]", "must be finite");
     let cone = "kind = \"cone\"\nradius = 10\nwidth = 30\nhalf_angle = 45\n";
@@ -350,18 +363,201 @@ fn a_path_tolerance_is_positive_and_has_heights_between_positions() {
     assert!(error.contains("13 | path_tolerance"), "{error}");
 }
 
+/// `JOB` with `more` in its last section, which is the program's, and after it.
+fn with(more: &str) -> String {
+    format!("{JOB}{more}\n")
+}
+
+#[test]
+fn a_program_is_linuxcncs_unless_the_job_says_otherwise() {
+    let p = valid(JOB).program;
+    assert_eq!(p.control, Control::LinuxCnc);
+    assert_eq!(
+        p.words.map(|w| (w.letter, w.negative)),
+        [('X', false), ('Y', false), ('A', false)]
+    );
+    assert_eq!(
+        (p.decimals, p.units, p.point),
+        ([4, 4, 4], Units::Mm, Programmed::Centre)
+    );
+    assert_eq!(
+        (p.angles, p.feed_mode),
+        (Angles::Unwound, FeedMode::Inverse)
+    );
+    assert_eq!((p.split, p.block_numbers), (None, 0));
+    let p = valid(&with(
+        "dialect = 'siemens'\ntravel = '-Z'\nattack = 'X'\nrotation = '-C'\nunits = 'inch'\npoint = 'tip'
+decimals = { rotation = 2 }\nangles = 'modulo'\nfeed_mode = 'degrees'\nsplit = { bytes = 20000 }",
+    ))
+    .program;
+    assert_eq!(p.control, Control::Siemens);
+    assert_eq!(
+        p.words.map(|w| (w.letter, w.negative)),
+        [('Z', true), ('X', false), ('C', true)]
+    );
+    assert_eq!(
+        (p.decimals, p.units, p.point),
+        ([5, 5, 2], Units::Inch, Programmed::Tip)
+    );
+    assert_eq!((p.angles, p.feed_mode), (Angles::Modulo, FeedMode::Degrees));
+    assert_eq!((p.split, p.block_numbers), (Some(Split::Bytes(20_000)), 10));
+    let flags = Overrides {
+        dialect: Some("fanuc".to_owned()),
+        split: Some(1000),
+        ..Overrides::default()
+    };
+    let p = job(&with("split = { bytes = 20000 }"), &flags)
+        .expect("valid")
+        .program;
+    assert_eq!(
+        (p.control, p.split),
+        (Control::Fanuc, Some(Split::Moves(1000)))
+    );
+    assert_eq!((p.decimals, p.shortest()), ([3; 3], 60.0 / 9999.999));
+}
+
+#[test]
+fn what_a_control_is_not_known_to_do_is_refused() {
+    for (more, expected) in [
+        (
+            "dialect = 'heidenhain'",
+            "unknown dialect 'heidenhain'; known: linuxcnc, fanuc, siemens, mach",
+        ),
+        (
+            "travel = 'A'",
+            "travel is \"A\", but must be one of X, Y, Z, with a minus",
+        ),
+        ("rotation = '--C'", "but must be one of A, B, C"),
+        ("attack = ''", "but must be one of X, Y, Z"),
+        ("attack = '-X'", "travel and attack are both X"),
+        ("travel = 'Y'", "travel and attack are both Y"),
+        ("units = 'cm'", "unknown units 'cm'; known: mm, inch"),
+        ("point = 'rim'", "unknown point 'rim'; known: centre, tip"),
+        ("angles = 'wound'", "known: unwound, modulo, rezero"),
+        (
+            "dialect = 'mach'\nangles = 'modulo'",
+            "Mach3 and Mach4 is not known to count turns as modulo; known: unwound, rezero",
+        ),
+        (
+            "dialect = 'beckhoff'\nangles = 'rezero'",
+            "TwinCAT CNC is not known to count turns as rezero",
+        ),
+        (
+            "feed_mode = 'degrees'",
+            "F cannot count degrees alone on LinuxCNC",
+        ),
+        (
+            "dialect = 'grblhal'\nfeed_mode = 'minute'",
+            "is not known; choose feed_mode = \"inverse\"",
+        ),
+        (
+            "dialect = 'fanuc'\nfeed_mode = 'minute'\nunits = 'inch'",
+            "what F makes of degrees on Fanuc 16 to 31, machining centre in inches is not known",
+        ),
+        ("split = {}", "split is { bytes = N } or { moves = N }"),
+        (
+            "split = { bytes = 20000, moves = 5 }",
+            "split is { bytes = N } or { moves = N }",
+        ),
+    ] {
+        let error = job(&with(more), &Overrides::default()).expect_err(more);
+        let error = error.to_string();
+        assert!(
+            error.contains(expected) && error.contains("jobs/job.toml:"),
+            "{error}"
+        );
+    }
+    let few = with("angles = 'modulo'").replacen("= 360", "= 2", 1);
+    let error = job(&few, &Overrides::default())
+        .expect_err("either way")
+        .to_string();
+    assert!(
+        error.contains("at least 3 points_per_revolution"),
+        "{error}"
+    );
+}
+
+const MACHINE: &str = "[machine]
+travel = { range = [-20, 300], velocity = 500, acceleration = 2000 }
+attack = { velocity = 700.0, acceleration = 20000, jerk = 1e6 }
+rotation = { velocity = 600, acceleration = 3600 }
+turns = 60";
+
+#[test]
+fn a_machine_has_the_limits_that_are_given() {
+    let j = valid(&with(MACHINE));
+    assert_eq!(j.machine.ranges, [Some(-20.0..=300.0), None]);
+    let limits = j.machine.limits(&j.program);
+    assert_eq!((limits.feed, limits.shortest), (25.0, 0.0));
+    let [travel, attack, rotation] = limits.axes;
+    assert_eq!((travel.velocity, travel.jerk), (500.0, f64::INFINITY));
+    assert_eq!((attack.acceleration, attack.jerk), (20_000.0, 1.0e6));
+    assert_eq!((rotation.velocity, rotation.acceleration), (360.0, 3600.0));
+    let j = valid(JOB);
+    assert_eq!(j.machine.limits(&j.program).axes, [AxisLimits::NONE; 3]);
+}
+
+#[test]
+fn machines_that_cannot_be_are_refused() {
+    for (old, new, expected) in [
+        (
+            "[-20, 300]",
+            "[300, -20]",
+            "range of travel is from 300 to -20",
+        ),
+        ("[-20, 300]", "[nan, 300]", "must be finite"),
+        ("[-20, 300]", "[-20]", "invalid length 1"),
+        (
+            "velocity = 500",
+            "velocity = 0",
+            "velocity of travel is 0, but must be greater than 0 (mm)",
+        ),
+        (
+            "= 3600",
+            "= -1",
+            "acceleration of rotation is -1, but must be greater than 0 (degrees)",
+        ),
+        ("turns = 60", "turns = inf", "turns is inf"),
+        (
+            "acceleration = 20000, ",
+            "",
+            "jerk of attack needs its acceleration as well",
+        ),
+        (
+            "{ velocity = 600",
+            "{ range = [0, 360], velocity = 600",
+            "rotation has no range",
+        ),
+        ("velocity = 500", "speed = 500", "unknown key `speed`"),
+    ] {
+        assert!(MACHINE.contains(old), "{old}");
+        let text = with(&MACHINE.replacen(old, new, 1));
+        let error = job(&text, &Overrides::default())
+            .expect_err(new)
+            .to_string();
+        assert!(
+            error.contains(expected) && error.contains("jobs/job.toml:"),
+            "{error}"
+        );
+    }
+}
+
 #[test]
 fn the_echo_is_a_job_again() {
-    let j = valid(&JOB.replacen("step = 2", "step = 2\npath_tolerance = 0.005", 1));
-    let mut echo = j.echo();
-    // TOML has no null.
-    echo["motion"]
-        .as_object_mut()
-        .expect("a table")
-        .retain(|_, v| !v.is_null());
-    let text = toml::to_string(&echo).expect("TOML");
-    let again = parse(&text, Path::new("job.toml"), &Overrides::default()).expect("valid");
-    assert_eq!(again, j);
+    let path = JOB.replacen("step = 2", "step = 2\npath_tolerance = 0.005", 1);
+    let more = "travel = '-Z'\nangles = 'rezero'\nsplit = { moves = 5000 }\n";
+    for text in [path.clone(), format!("{path}{more}{MACHINE}\n")] {
+        let j = valid(&text);
+        let mut echo = j.echo();
+        // TOML has no null.
+        for section in ["motion", "program"] {
+            let section = echo[section].as_object_mut().expect("a table");
+            section.retain(|_, v| !v.is_null());
+        }
+        let text = toml::to_string(&echo).expect("TOML");
+        let again = parse(&text, Path::new("job.toml"), &Overrides::default()).expect("valid");
+        assert_eq!(again, j);
+    }
 }
 
 #[test]
