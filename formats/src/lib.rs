@@ -15,6 +15,7 @@ pub mod step_out;
 mod decimal;
 pub mod output;
 
+pub mod apt;
 pub mod csv;
 pub mod plot;
 pub mod post;

@@ -13,6 +13,8 @@ use crate::post::Control;
 pub const PATH: &str = "path.csv";
 /// What was computed, by whom and how fast.
 pub const REPORT: &str = "report.json";
+/// The path as cutter locations.
+pub const APT: &str = "path.apt";
 /// The picture.
 pub const PREVIEW: &str = "preview.png";
 /// The run to look at.
@@ -56,7 +58,7 @@ pub fn program_name(control: Control, part: Option<u32>) -> String {
 
 /// Whether a run may give a file of its output directory this name.
 fn of_run(name: &str) -> bool {
-    [PATH, REPORT, PREVIEW, VIEW].contains(&name) || of_program(name)
+    [PATH, REPORT, APT, PREVIEW, VIEW].contains(&name) || of_program(name)
 }
 
 fn of_program(name: &str) -> bool {
