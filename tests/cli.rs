@@ -297,7 +297,13 @@ fn the_sample_is_written_runs_and_is_not_overwritten() {
     let output = run(&["run", text(&job), "-o", text(&out), "--step", "10"]);
     let (said, progress) = texts(&output);
     assert!(output.status.success(), "{progress}");
-    for name in ["path.csv", "path.ngc", "report.json", "preview.png"] {
+    for name in [
+        "path.csv",
+        "path.ngc",
+        "report.json",
+        "report.html",
+        "preview.png",
+    ] {
         assert!(
             said.contains(name) && out.join(name).exists(),
             "{name}: {said}"
@@ -689,5 +695,33 @@ fn a_bench_of_clusters_tells_what_each_took_and_what_that_projects() {
         &["bench", "scaling", text(&missing), "-o", text(&out)],
         2,
         &["missing.toml"],
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_is_viewed_in_the_browser_that_is_named() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let dir = scratch();
+    let dir = dir.path();
+    check(&["view", text(dir)], 2, &["report.html", "horma run"]);
+    let page = file(dir, "report.html", b"").canonicalize().expect("there");
+    let (browser, seen) = (dir.join("browser"), dir.join("seen"));
+    let script = format!("#!/bin/sh\nprintf %s \"$1\" > {}\n", seen.display());
+    std::fs::write(&browser, script).expect("writable");
+    let executable = std::fs::Permissions::from_mode(0o755);
+    std::fs::set_permissions(&browser, executable).expect("ours");
+    let said = succeed(&["view", text(dir), "--browser", text(&browser)]);
+    assert_eq!(said.trim_end(), text(&page));
+    assert_eq!(std::fs::read_to_string(seen).expect("opened"), text(&page));
+
+    let nobody = run(&["view", text(dir), "--browser", "/nowhere/browser"]);
+    let (said, err) = texts(&nobody);
+    assert_eq!(nobody.status.code(), Some(3));
+    assert!(said.contains("report.html"), "the path helps all the same");
+    assert!(
+        err.contains("--browser") && err.contains("by hand"),
+        "{err}"
     );
 }

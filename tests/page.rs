@@ -28,7 +28,7 @@ const OBSERVE: &str = "
 
 #[test]
 fn the_page_shows_a_job_from_its_begin_to_its_end() {
-    let Some(browser) = Browser::start() else {
+    let Some(browser) = Browser::start(&["--disable-gpu"]) else {
         return;
     };
     let dir = scratch();

@@ -103,14 +103,20 @@ fn a_path_beyond_the_machine_is_refused_with_its_place() {
 fn the_report_tells_what_holds_the_machine_back() {
     let dir = scratch();
     let out = dir.path().join("out");
-    let more = "[program]\nfeed = 100000\n[machine]
+    let more = "[program]\nfeed = 100000\napt = true
+[machine]
 travel = { velocity = 200, acceleration = 1000 }
 attack = { range = [0, 500], velocity = 300, acceleration = 3000, jerk = 50000 }
 rotation = { acceleration = 1800 }
 turns = 45\n";
     let job = job(dir.path(), more);
     succeed(&["run", text(&job), "-o", text(&out), "-q", "--no-verify"]);
-    let program = report(&out)["program"].clone();
+    let apt = std::fs::read_to_string(out.join("path.apt")).expect("locations");
+    let report = report(&out);
+    let positions = report["path"]["positions"].as_u64().expect("positions");
+    // All of them, and retracted before and after.
+    assert_eq!(apt.matches("\nGOTO/").count() as u64, positions + 2);
+    let program = report["program"].clone();
     let bounds = program["bounds"].as_array().expect("bounds");
     let share: f64 = bounds.iter().filter_map(|b| b[1].as_f64()).sum();
     assert!((share - 1.0).abs() < 1e-9, "{bounds:?}");

@@ -344,7 +344,7 @@ fn a_job_is_sent_looked_at_cancelled_and_fetched() {
     let with_job = fetch(&second, &[text(&job)]);
     assert!(with_job.status.success(), "{:?}", texts(&with_job));
     assert!(std::fs::read(out.join("path.csv")).expect("a path") == alone);
-    for file in ["path.ngc", "preview.png", "report.json"] {
+    for file in ["path.ngc", "preview.png", "report.json", "report.html"] {
         assert!(out.join(file).exists(), "{file}");
     }
     assert!(report(&out)["verification"].is_object());

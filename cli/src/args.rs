@@ -16,6 +16,7 @@ const AFTER_HELP: &str = "\
 Start with:
   horma init demo                       a sample last, its holders and a job
   horma run demo/job.toml -o out        digitize it in this process
+  horma view out                        look at it: the part, its path, errors, axes, figures
   horma run demo/job.toml -o out -w 2   the same on two worker processes: the same bytes
 
 Across machines, each with its certificate:
@@ -86,6 +87,11 @@ Example:
 
 Writes machined.ply (mm, part coordinates, a deviation and a colour at each corner) and machined.svg.")]
     Machined(Machined),
+    /// Look at what a run has written: tells where its report.html is, and opens it in a browser
+    ///
+    /// The page needs no network and can be sent to others as it is: the part with its path and the wheel
+    /// in three dimensions, gouges and excess, the attack axis over time, all figures.
+    View(View),
     /// Serve as a master: workers register, clients submit jobs
     Master(Master),
     /// Serve as a worker of a master
@@ -160,7 +166,7 @@ pub(crate) struct Traces {
 pub(crate) struct Run {
     #[command(flatten)]
     pub job: Job,
-    /// Directory for path.csv, the program (path.ngc), report.json and preview.png
+    /// Directory for path.csv, the program (path.ngc), report.json, report.html and preview.png
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Worker processes on this machine; 0 computes in this process
@@ -226,10 +232,20 @@ pub(crate) struct Machined {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct View {
+    /// The directory that was given to `horma run -o`
+    #[arg(value_name = "DIR")]
+    pub directory: PathBuf,
+    /// The browser's program [default: whatever the system opens pages with]
+    #[arg(long, value_name = "PROGRAM", env = "BROWSER")]
+    pub browser: Option<String>,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct Submit {
     #[command(flatten)]
     pub job: Job,
-    /// Directory for path.csv, the program (path.ngc), report.json and preview.png
+    /// Directory for path.csv, the program (path.ngc), report.json, report.html and preview.png
     #[arg(short, long, value_name = "DIR", required_unless_present = "detach")]
     pub output: Option<PathBuf>,
     /// Print the job's number and do not wait: `horma status` and `horma fetch` take it, also after
@@ -281,7 +297,7 @@ pub(crate) struct Fetch {
     /// The job's number
     #[arg(value_name = "ID")]
     pub id: u64,
-    /// The job file (TOML): with it also the program, preview.png and the verification
+    /// The job file (TOML): with it also the program, report.html, preview.png and the verification
     #[arg(value_name = "JOB")]
     pub file: Option<PathBuf>,
     /// Directory for the results

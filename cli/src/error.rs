@@ -103,6 +103,10 @@ pub(crate) enum Error {
         /// Whether what is wrong is here.
         here: bool,
     },
+    #[error("{}: there is no such page; name a directory that `horma run JOB -o DIR` has written", path.display())]
+    NothingToView { path: PathBuf },
+    #[error("no browser opens {} ({reason}); name one with --browser, or open the page by hand", path.display())]
+    NoBrowser { path: PathBuf, reason: String },
     #[error("cannot start threads: {0}")]
     Threads(String),
     #[error("interrupted")]
@@ -120,7 +124,8 @@ impl Error {
             Self::Impossible { .. }
             | Self::Differs { .. }
             | Self::Gouge { .. }
-            | Self::MotionGouge { .. } => 3,
+            | Self::MotionGouge { .. }
+            | Self::NoBrowser { .. } => 3,
             Self::Master(horma_master::Error::Plan(e)) => of_core(e),
             Self::Master(
                 horma_master::Error::StoreUnusable { .. } | horma_master::Error::StoreFormat { .. },
@@ -137,6 +142,7 @@ impl Error {
             | Self::Refused { .. }
             | Self::NoSuchJob { .. }
             | Self::OneProcess
+            | Self::NothingToView { .. }
             | Self::Traces(_)
             | Self::Unfit { here: true, .. }
             | Self::Worker(

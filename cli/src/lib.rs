@@ -24,6 +24,7 @@ mod http;
 mod inspect;
 mod reach;
 mod serve;
+mod view;
 
 mod progress;
 mod system;
@@ -100,6 +101,7 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Fetch(args) => run::fetch(args),
         Command::Verify(args) => verify::verify(&args),
         Command::Machined(args) => machined::machined(&args),
+        Command::View(args) => view::view(&args),
         Command::Master(master) => serve::master(&master),
         Command::Worker(worker) => serve::worker(worker),
         Command::Doctor(args) => doctor::doctor(&args),

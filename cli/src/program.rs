@@ -6,6 +6,7 @@ use horma_core::{ToolPath, course, steady, timing};
 use horma_formats::job::JobFile;
 use horma_formats::post::{self, Heading, Placed};
 use horma_formats::report::ProgramStatistics;
+use horma_formats::{apt, output};
 
 use crate::error::Result;
 
@@ -25,6 +26,16 @@ pub(crate) fn write(
     let limits = file.machine.limits(program);
     let timing = timing(&placed.stations, &limits);
     let files = post::save(dir, &placed, &timing.durations, program, heading)?;
+    if program.apt {
+        apt::save(
+            &dir.join(output::APT),
+            &placed.stations,
+            &timing.durations,
+            &file.job.cutter,
+            (program.feed, program.clearance),
+            heading,
+        )?;
+    }
     let steady = steady(&course, &limits);
     Ok(ProgramStatistics::of(
         program,

@@ -6,11 +6,13 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Instant;
 
-use horma_core::{Counters, Method, Part, Phase, Position, Simd, ToolPath, Verification, place};
+use horma_core::{
+    Clearances, Counters, Method, Part, Phase, Position, Simd, ToolPath, Verification, place,
+};
 use horma_formats::job::{self, JobFile, Overrides};
 use horma_formats::output::Staging;
 use horma_formats::report::{self, PathStatistics, Report};
-use horma_formats::{csv, output, part, preview};
+use horma_formats::{csv, output, part, preview, view};
 use horma_master::{Outcome, Progress};
 use horma_proto::{VERSION, trace};
 use tokio_util::sync::CancellationToken;
@@ -241,7 +243,7 @@ fn perform(
         let computing = compute(part.clone(), &file, display.clone(), stop.clone());
         let (path, mut record) = computing.await?;
         record.phases.insert(0, read);
-        let verification = if asked.how.no_verify {
+        let verified = if asked.how.no_verify {
             None
         } else {
             display.tell("verify", 0, 0);
@@ -257,6 +259,7 @@ fn perform(
             record.phases.push(phase("verify", begin));
             Some(found)
         };
+        let (verification, clearances) = verified.unzip();
         let report = Report {
             version: VERSION.to_owned(),
             job: file.echo(),
@@ -266,7 +269,13 @@ fn perform(
             program: None,
             record,
         };
-        let writing = || write(asked, &file, &part, &path, report, &display, &stop);
+        let made = Made {
+            part,
+            file,
+            path,
+            clearances,
+        };
+        let writing = || write(asked, &made, report, &display, &stop);
         info_span!("write").in_scope(writing)
     });
     // Before anything else is said, and also if nothing good came of it.
@@ -285,23 +294,29 @@ async fn verified(
     file: JobFile,
     positions: Vec<Position>,
     threads: usize,
-) -> Result<Verification> {
+) -> Result<(Verification, Clearances)> {
     let checking = tokio::task::spawn_blocking(move || {
         let found = verify::check(&part, &file, &positions, None, threads)?;
         if let Some(tolerance) = verify::tolerance(&file) {
-            verify::hold(&found, tolerance, file.job.motion.path_tolerance)?;
+            verify::hold(&found.0, tolerance, file.job.motion.path_tolerance)?;
         }
         Ok(found)
     });
     checking.await.unwrap_or(Err(Error::Interrupted))
 }
 
+/// What results are written of.
+struct Made {
+    part: Part,
+    file: JobFile,
+    path: ToolPath,
+    clearances: Option<Clearances>,
+}
+
 /// Writes all results, or none.
 fn write(
     asked: &Asked,
-    file: &JobFile,
-    part: &Part,
-    path: &ToolPath,
+    made: &Made,
     mut report: Report,
     display: &Display,
     stop: &CancellationToken,
@@ -320,14 +335,21 @@ fn write(
         ("job", &*asked.file.to_string_lossy()),
         ("cutter", &described(&report.job["cutter"])),
     ];
-    // The picture takes about as long as the rest.
-    let (drawn, written) = thread::scope(|scope| {
-        let drawing = scope.spawn(|| preview::save(&staging.file(output::PREVIEW), part, path));
+    let Made {
+        part, file, path, ..
+    } = made;
+    // What is to be looked at takes about as long as the rest.
+    let (drawn, seen, written) = thread::scope(|scope| {
+        let looking = scope.spawn(|| {
+            let drawn = preview::save(&staging.file(output::PREVIEW), part, path);
+            let clearances = made.clearances.as_ref();
+            (drawn, view::view(part, &file.job.cutter, path, clearances))
+        });
         let written = program::write(staging.dir(), path, file, &heading)?;
         going_on()?;
         csv::save(&staging.file(output::PATH), path)?;
-        let drawn = drawing.join().unwrap_or_else(|panic| resume_unwind(panic));
-        Ok::<_, Error>((drawn, written))
+        let (drawn, seen) = looking.join().unwrap_or_else(|panic| resume_unwind(panic));
+        Ok::<_, Error>((drawn, seen, written))
     })?;
     going_on()?;
     report.program = Some(written);
@@ -339,6 +361,7 @@ fn write(
     }
     report.record.phases.push(phase("write", begin));
     report::save(&staging.file(output::REPORT), &report)?;
+    view::save(&staging.file(output::VIEW), &seen, &report)?;
     staging.publish()?;
     Ok(report)
 }
@@ -404,11 +427,12 @@ fn summarize(dir: &Path, report: &Report) {
         (program::describe(p), names.join(" to "))
     });
     say(&format!(
-        "{} positions{inserted}, {} without contact{beyond}{lost}{window}{verification}\n{cutting}\n{}\n{programs}\n{}\n{}",
+        "{} positions{inserted}, {} without contact{beyond}{lost}{window}{verification}\n{cutting}\n{}\n{programs}\n{}\n{}\n{}",
         path.positions,
         path.without_contact,
         dir.join(output::PATH).display(),
         dir.join(output::REPORT).display(),
         dir.join(output::PREVIEW).display(),
+        dir.join(output::VIEW).display(),
     ));
 }

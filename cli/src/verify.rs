@@ -1,6 +1,9 @@
 //! Verification: a path held against the designed surface, on its own or at the end of a run.
 
-use horma_core::{Deviation, Discretization, Gouge, Part, Position, Verification, place};
+use horma_core::{
+    Clearances, Deviation, Discretization, Gouge, Part, Position, Verification, place,
+    verify_everywhere,
+};
 use horma_formats::job::{self, JobFile};
 use horma_formats::{csv, part};
 
@@ -18,7 +21,7 @@ pub(crate) fn verify(args: &args::Verify) -> Result<()> {
     let (part, _) = part::read_all(&file.files)?;
     let part = place(part, file.axis)?;
     let threads = args.threads.map_or_else(system::cores, usize::from);
-    let verification = check(&part, &file, &positions, args.spacing, threads)?;
+    let (verification, _) = check(&part, &file, &positions, args.spacing, threads)?;
     if args.json {
         say(&serde_json::to_string_pretty(&verification).unwrap_or_default());
     } else {
@@ -29,17 +32,17 @@ pub(crate) fn verify(args: &args::Verify) -> Result<()> {
     tolerance.map_or(Ok(()), |t| hold(&verification, t, path_tolerance))
 }
 
-/// Verifies positions on `threads` threads.
+/// Verifies positions on `threads` threads; also tells where what was found.
 pub(crate) fn check(
     part: &Part,
     file: &JobFile,
     positions: &[Position],
     spacing: Option<f64>,
     threads: usize,
-) -> Result<Verification> {
+) -> Result<(Verification, Clearances)> {
     let (cutter, step) = (&file.job.cutter, Some(file.job.motion.step));
     Ok(system::pool(threads)?
-        .install(|| horma_core::verify(part, cutter, step, positions, spacing))?)
+        .install(|| verify_everywhere(part, cutter, step, positions, spacing))?)
 }
 
 /// How deep a path may gouge, if the job says so.

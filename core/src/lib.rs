@@ -83,4 +83,7 @@ pub use simd::Simd;
 pub use surface::{Direction, MAX_DEGREE, Surface};
 pub use tolerance::MAX_COORDINATE;
 pub use vector::{Interval, Point, cross, dot, length, sub, unit};
-pub use verify::{Deviation, Excess, Gouge, INTERMEDIATE, Position, Scallop, Verification, verify};
+pub use verify::{
+    Clearances, Deviation, Excess, Gouge, INTERMEDIATE, Position, Scallop, Verification,
+};
+pub use verify::{verify, verify_everywhere};

@@ -10,7 +10,7 @@
 //!
 //! Between samples, `spacing` apart, a gouge can be deeper than reported by up to about `spacing² / 2`
 //! times the difference of the curvatures of cutter and part: 16 µm for 0.5 mm and a radius of 8 mm.
-//! Memory: about 80 bytes a sample and 210 bytes a position.
+//! Memory: about 90 bytes a sample and 210 bytes a position.
 
 mod body;
 mod hierarchy;
@@ -117,6 +117,16 @@ pub struct Gouge {
     pub height: f64,
 }
 
+/// The clearance of each sample of the designed surface.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Clearances {
+    /// The samples, in part coordinates, mm.
+    pub points: Vec<Point>,
+    /// Least clearance of each along the normal, over all positions, moves left out, mm: negative where
+    /// it is gouged, else the material left. Empty if the path has no position with a height.
+    pub normal: Vec<f64>,
+}
+
 /// Verifies a path of `cutter` against the designed surface of `part`, which is in the part frame.
 /// `step`, the travel per revolution in mm, is for the scallop; `spacing` is that of the samples in
 /// mm, by default such that there are about 240 thousand: half a millimetre on a shoe last. Runs on
@@ -132,6 +142,20 @@ pub fn verify(
     positions: &[Position],
     spacing: Option<f64>,
 ) -> Result<Verification> {
+    verify_everywhere(part, cutter, step, positions, spacing).map(|(found, _)| found)
+}
+
+/// The same, and where on the surface it was found.
+///
+/// # Errors
+/// Those of [`verify`].
+pub fn verify_everywhere(
+    part: &Part,
+    cutter: &Cutter,
+    step: Option<f64>,
+    positions: &[Position],
+    spacing: Option<f64>,
+) -> Result<(Verification, Clearances)> {
     part.validate()?;
     if let Some(step) = step {
         let ok = step > 0.0 && step.is_finite();
@@ -139,7 +163,7 @@ pub fn verify(
     }
     check(positions)?;
     let samples = sample::sample(part, spacing)?;
-    let mut verification = match *cutter {
+    let (mut verification, normal) = match *cutter {
         Cutter::Torus {
             major_radius,
             minor_radius,
@@ -158,23 +182,25 @@ pub fn verify(
         } => verify_body(Cone::new(radius, width, slope), &samples, step, positions),
     };
     verification.scallop.predicted = step.and_then(|s| scallop::predicted(cutter, s));
-    Ok(verification)
+    let points = samples.points;
+    Ok((verification, Clearances { points, normal }))
 }
 
-/// The same with the cutter's body; all but the predicted scallop.
+/// The same with the cutter's body, all but the predicted scallop; and the normal clearances.
 fn verify_body<S: Solid + Copy>(
     body: S,
     samples: &Samples,
     step: Option<f64>,
     positions: &[Position],
-) -> Verification {
+) -> (Verification, Vec<f64>) {
     let points = &samples.points;
     let items = items(positions);
     let standing = items.len() as u64;
     let moves = items.iter().filter(|i| i.by.is_some()).count() as u64;
     let survey = survey::survey(&Hierarchy::new(body, items), points);
+    let excess: Vec<f64> = survey.normal.iter().map(|c| c.max(0.0)).collect();
     let measured = match step {
-        Some(step) if standing > 0 => scallop::measured(samples, &survey.normal, step),
+        Some(step) if standing > 0 => scallop::measured(samples, &excess, step),
         _ => None,
     };
     let reached: Vec<f64> = survey.attack.into_iter().flatten().collect();
@@ -198,19 +224,20 @@ fn verify_body<S: Solid + Copy>(
             gouge(w, w.index / INTERMEDIATE, share)
         }),
     };
-    Verification {
+    let verification = Verification {
         samples: points.len() as u64,
         spacing: samples.spacing,
         positions: standing,
         moves,
         never_reached: never as f64 / points.len() as f64,
-        normal: deviation(0, survey.normal),
+        normal: deviation(0, excess),
         attack: deviation(1, reached),
         scallop: Scallop {
             predicted: None,
             measured,
         },
-    }
+    };
+    (verification, survey.normal)
 }
 
 /// Refuses numbers that are not finite or so far out that they would lose their last digits.

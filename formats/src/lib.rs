@@ -15,6 +15,7 @@ pub mod step_out;
 mod decimal;
 pub mod output;
 
+pub mod apt;
 pub mod csv;
 pub mod map;
 pub mod plot;
@@ -22,5 +23,6 @@ pub mod ply;
 pub mod post;
 pub mod preview;
 pub mod report;
+pub mod view;
 
 pub use error::{Error, Result};

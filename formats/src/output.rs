@@ -13,8 +13,12 @@ use crate::post::Control;
 pub const PATH: &str = "path.csv";
 /// What was computed, by whom and how fast.
 pub const REPORT: &str = "report.json";
+/// The path as cutter locations.
+pub const APT: &str = "path.apt";
 /// The picture.
 pub const PREVIEW: &str = "preview.png";
+/// The run to look at.
+pub const VIEW: &str = "report.html";
 
 /// The machined surface as triangles.
 pub const MACHINED_MESH: &str = "machined.ply";
@@ -59,7 +63,7 @@ pub fn program_name(control: Control, part: Option<u32>) -> String {
 
 /// Whether a run may give a file of its output directory this name.
 fn of_run(name: &str) -> bool {
-    [PATH, REPORT, PREVIEW].contains(&name) || of_program(name)
+    [PATH, REPORT, APT, PREVIEW, VIEW].contains(&name) || of_program(name)
 }
 
 fn of_program(name: &str) -> bool {

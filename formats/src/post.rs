@@ -38,6 +38,8 @@ pub struct Program {
     pub feed_mode: FeedMode,
     /// Where a file ends and the next begins; a single file if nowhere.
     pub split: Option<Split>,
+    /// Whether the path is written as cutter locations as well.
+    pub apt: bool,
     /// Block numbers go by this; 0 for none.
     pub block_numbers: u32,
     /// Feed at the contact, mm/min.

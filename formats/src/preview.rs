@@ -15,6 +15,7 @@ use crate::output;
 
 pub use render::{Colour, Polyline, SIZE, png};
 pub use sheet::Sheet;
+pub(crate) use sheet::sheets;
 
 /// Colour of the line along which the cutter touches.
 pub const CONTACT: Colour = [13, 71, 161];
@@ -41,7 +42,7 @@ pub fn save(file: &Path, part: &Part, path: &ToolPath) -> Result<()> {
             width: 0.8,
         },
     ];
-    let picture = png(&sheet::sheets(part), &lines);
+    let picture = png(&sheets(part), &lines);
     output::write(file, |file| file.write_all(&picture))
 }
 

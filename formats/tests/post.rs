@@ -31,6 +31,7 @@ fn program(control: Control) -> Program {
         angles: Angles::Unwound,
         feed_mode: FeedMode::Inverse,
         split: None,
+        apt: false,
         block_numbers: control.dialect().block_numbers,
         feed: 1500.0,
         clearance: 20.0,

@@ -262,6 +262,7 @@ async fn receive(
         match reply.kind {
             Some(Reply::Positions(positions)) => {
                 let cost = horma_proto::counters_from_wire(reply.counters.unwrap_or_default());
+                let cost = cost.map_err(wrong)?;
                 take(attempt, sent, &positions, cost)?;
                 if sent.left() > 0 && attempt.coming.received().left() == 0 {
                     // The rest has come from whoever it helps, or is helped by.

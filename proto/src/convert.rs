@@ -153,14 +153,22 @@ pub fn counters_to_wire(counters: Counters) -> wire::Counters {
 }
 
 /// What searches cost, from the wire.
-pub fn counters_from_wire(counters: wire::Counters) -> Counters {
-    Counters {
+///
+/// # Errors
+/// [`Error::Malformed`] if a loss is no length: no report or journal could give it back.
+pub fn counters_from_wire(counters: wire::Counters) -> Result<Counters> {
+    let loss = counters.largest_loss;
+    if !(0.0..f64::INFINITY).contains(&loss) {
+        let why = format!("a largest loss of {loss} mm");
+        return Err(Error::Malformed(why));
+    }
+    Ok(Counters {
         evaluations: counters.evaluations,
         nodes: counters.nodes,
         lost: counters.lost,
-        largest_loss: counters.largest_loss,
+        largest_loss: loss,
         beyond_tolerance: counters.beyond_tolerance,
-    }
+    })
 }
 
 fn kind_to_wire(kind: MotionKind) -> wire::MotionKind {

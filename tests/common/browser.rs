@@ -18,8 +18,8 @@ pub struct Browser {
 }
 
 impl Browser {
-    /// Nothing, by name, where there is none.
-    pub fn start() -> Option<Self> {
+    /// Started with these switches; nothing, by name, where there is none.
+    pub fn start(switches: &[&str]) -> Option<Self> {
         let mut driver = Command::new("chromedriver");
         driver
             .arg("--port=0")
@@ -40,7 +40,9 @@ impl Browser {
             address: format!("127.0.0.1:{}", port.expect("a port")),
             session: String::new(),
         };
-        let options = json!({"args": ["--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]});
+        let always = ["--headless=new", "--no-sandbox", "--hide-scrollbars"];
+        let switches = [&always[..], switches].concat();
+        let options = json!({"args": switches});
         let wanted = json!({
             "goog:chromeOptions": options,
             "goog:loggingPrefs": {"browser": "ALL"},

@@ -16,7 +16,7 @@ const CHUNK: usize = 2048;
 /// What holding samples against a path gives; lengths in mm.
 #[derive(Debug, Default)]
 pub(super) struct Survey {
-    /// Normal excess of each sample; of none if there is no position.
+    /// Normal clearance of each sample, negative where it is gouged; of none if there is no position.
     pub normal: Vec<f64>,
     /// Excess of each sample along the attack axis, `None` where no position reaches it.
     pub attack: Vec<Option<f64>>,
@@ -78,9 +78,9 @@ fn survey_chunk(hierarchy: &Hierarchy<impl Solid>, points: &[Point], first: usiz
         last = found.standing;
         all.gouges = worse(all.gouges, found.standing, sample);
         all.motion_gouges = worse(all.motion_gouges, found.moving, sample);
-        let excess = |l: Least| l.is_found().then(|| l.value.max(0.0));
-        all.normal.extend(excess(last.normal));
-        all.attack.push(excess(last.attack));
+        let clearance = |l: Least| l.is_found().then_some(l.value);
+        all.normal.extend(clearance(last.normal));
+        all.attack.push(clearance(last.attack).map(|c| c.max(0.0)));
     }
     all
 }

@@ -389,11 +389,19 @@ fn any_number_of_threads_finds_the_same() {
     let path = helix(-4.0, 44.0, 1.0, 90, |t| Some(43.0 + 3.0 * t.cos()));
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        let run = || verify(&part, &cutter, Some(1.0), &path, Some(0.5));
+        let run = || verify_everywhere(&part, &cutter, Some(1.0), &path, Some(0.5));
         pool.build().expect("threads").install(run).expect("valid")
     };
     let one = with(1);
-    assert!(one.normal.gouge.is_some() && one.normal.motion_gouge.is_some());
+    let (found, everywhere) = &one;
+    let gouge = found.normal.gouge.expect("gouged");
+    assert!(found.normal.motion_gouge.is_some());
+    let least = everywhere.normal.iter().copied().fold(f64::MAX, f64::min);
+    let most = everywhere.normal.iter().copied().fold(f64::MIN, f64::max);
+    assert_eq!(least, -gouge.depth);
+    assert_eq!(Some(most), found.normal.excess.map(|e| e.max));
+    let worst = everywhere.normal.iter().position(|&c| c == least);
+    assert_eq!(everywhere.points[worst.expect("there")], gouge.point);
     assert_eq!(one, with(2));
     assert_eq!(one, with(5));
 }

@@ -118,6 +118,7 @@ fn program_echo(program: &Program) -> Value {
             Split::Moves(most) => json!({ "moves": most }),
         }),
         "block_numbers": program.block_numbers,
+        "apt": program.apt,
         "feed": program.feed,
         "clearance": program.clearance,
     })

@@ -62,6 +62,7 @@ impl Source<'_> {
             angles: self.choose(angles, "angles", Angles::Unwound, &ANGLES)?,
             feed_mode: self.choose(mode, "feed_mode", FeedMode::Inverse, &FEED_MODES)?,
             split: self.split(section.split.as_ref())?,
+            apt: section.apt.as_ref().is_some_and(|g| g.value),
             block_numbers: self.block_numbers(section.block_numbers.as_ref(), dialect)?,
             feed: self.number(
                 section.feed.as_ref(),

@@ -150,6 +150,7 @@ pub(super) struct RawProgram {
     pub(super) feed_mode: Option<Given<String>>,
     pub(super) split: Option<Given<RawSplit>>,
     pub(super) block_numbers: Option<Given<i64>>,
+    pub(super) apt: Option<Given<bool>>,
     pub(super) feed: Option<Given<f64>>,
     pub(super) clearance: Option<Given<f64>>,
 }

@@ -545,7 +545,7 @@ fn machines_that_cannot_be_are_refused() {
 #[test]
 fn the_echo_is_a_job_again() {
     let path = JOB.replacen("step = 2", "step = 2\npath_tolerance = 0.005", 1);
-    let more = "travel = '-Z'\nangles = 'rezero'\nsplit = { moves = 5000 }\n";
+    let more = "travel = '-Z'\nangles = 'rezero'\napt = true\nsplit = { moves = 5000 }\n";
     for text in [path.clone(), format!("{path}{more}{MACHINE}\n")] {
         let j = valid(&text);
         let mut echo = j.echo();

@@ -1,0 +1,213 @@
+//! `report.html`: a run to look at. One file that works from disk and asks the network for nothing.
+//!
+//! [`view()`] makes plain data of what was computed, thinned until a browser can hold it; [`save`]
+//! writes the page around it. What is drawn, and how, is for the page alone; nothing is computed here
+//! that decides anything about a path.
+
+mod errors;
+mod pack;
+mod solid;
+mod thin;
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use horma_core::{Clearances, Cutter, Index, MotionKind, Part, Point, ToolPath};
+use serde::Serialize;
+
+use crate::error::Result;
+use crate::output;
+use crate::report::Report;
+
+pub use errors::Errors;
+pub use solid::Solid;
+pub use thin::{Seen, Shown};
+
+/// Places along the profile of a wheel.
+const PROFILE: usize = 32;
+
+/// What the page shows, thinned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// How positions follow each other.
+    pub motion: Motion,
+    /// The wheel's profile: axial distance from its centre and radius there, mm.
+    pub wheel: Vec<[f64; 2]>,
+    /// The part as triangles.
+    pub part: Solid,
+    /// The path.
+    pub path: Shown,
+    /// How far from the designed surface the path stays; nothing if that was not looked at.
+    pub errors: Option<Errors>,
+}
+
+/// What gives travel and angle of a position from its index, as [`horma_core::Trajectory`] does.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Motion {
+    /// `helix` or `rings`.
+    pub kind: &'static str,
+    /// Travel of the first position, mm.
+    pub from: f64,
+    /// Travel per revolution, mm.
+    pub step: f64,
+    /// Positions per revolution.
+    pub points_per_revolution: u32,
+}
+
+/// What there is to see of a path of `cutter` around `part`, and of how it was verified.
+pub fn view(
+    part: &Part,
+    cutter: &Cutter,
+    path: &ToolPath,
+    clearances: Option<&Clearances>,
+) -> View {
+    let trajectory = path.trajectory;
+    View {
+        motion: Motion {
+            kind: match trajectory.kind {
+                MotionKind::Helix => "helix",
+                MotionKind::Rings => "rings",
+            },
+            from: trajectory.from,
+            step: trajectory.step,
+            points_per_revolution: trajectory.points_per_revolution,
+        },
+        wheel: profile(cutter),
+        part: solid::solid(part),
+        path: thin::shown(path),
+        errors: clearances.map(errors::errors),
+    }
+}
+
+/// The wheel's profile from side to side; places lie closer together towards the sides, where a
+/// rounding falls off.
+fn profile(cutter: &Cutter) -> Vec<[f64; 2]> {
+    let half = cutter.half_width();
+    let places = (0..=PROFILE).map(|k| {
+        let turn = std::f64::consts::PI * (k as f64 / PROFILE as f64);
+        -half * libm::cos(turn)
+    });
+    let radii = places.filter_map(|d| cutter.profile(d).map(|m| [d, m]));
+    radii.collect()
+}
+
+/// What the page has to know of the numbers that are packed.
+#[derive(Serialize)]
+struct Contents<'a> {
+    motion: &'a Motion,
+    wheel: &'a [[f64; 2]],
+    triangles: Count,
+    positions: Count,
+    /// Of how many positions that follow each other the outstanding ones are shown.
+    every: u64,
+    samples: Option<Count>,
+    /// Bounds of classes of clearances, mm, and how many samples are in each: one more than bounds.
+    classes: Option<(&'a [f64], &'a [u64])>,
+    /// The box that coordinates are counted in, mm.
+    low: Point,
+    high: Point,
+}
+
+/// How many are shown of how many.
+#[derive(Serialize)]
+struct Count {
+    shown: u64,
+    of: u64,
+}
+
+const HTML: &str = include_str!("view/page/index.html");
+const STYLE: &str = include_str!("view/page/page.css");
+/// One script, in the order in which one part uses another.
+const SCRIPTS: [&str; 7] = [
+    include_str!("view/page/data.js"),
+    include_str!("view/page/colour.js"),
+    include_str!("view/page/mesh.js"),
+    include_str!("view/page/scene.js"),
+    include_str!("view/page/plots.js"),
+    include_str!("view/page/tables.js"),
+    include_str!("view/page/page.js"),
+];
+
+/// Writes the page that shows `view` and the figures of `report`: beside it first, then renamed.
+///
+/// # Errors
+/// [`crate::Error::Io`], naming `file`.
+pub fn save(file: &Path, view: &View, report: &Report) -> Result<()> {
+    output::write(file, |out| write(out, view, report))
+}
+
+fn write(out: &mut impl Write, view: &View, report: &Report) -> io::Result<()> {
+    let mut rest = HTML;
+    let mut until = |out: &mut dyn Write, mark: &str| -> io::Result<()> {
+        let (before, after) = rest.split_once(mark).expect("the page has its marks");
+        rest = after;
+        out.write_all(before.as_bytes())
+    };
+    until(out, "/* style */")?;
+    out.write_all(STYLE.as_bytes())?;
+    until(out, "<!-- data -->")?;
+    numbers(out, view, report)?;
+    until(out, "/* script */")?;
+    for script in SCRIPTS {
+        out.write_all(script.as_bytes())?;
+    }
+    out.write_all(rest.as_bytes())
+}
+
+/// Every number of the page, each kind in an element of its own.
+fn numbers(out: &mut impl Write, view: &View, report: &Report) -> io::Result<()> {
+    let View {
+        part, path, errors, ..
+    } = view;
+    let contacts = path.positions.iter().filter_map(|p| p.touch);
+    let contacts = contacts.map(|t| t.contact);
+    let samples = errors.iter().flat_map(|e| &e.points).copied();
+    let all = part.points.iter().copied().chain(contacts).chain(samples);
+    let (low, high) = pack::bounds(all);
+    let contents = Contents {
+        motion: &view.motion,
+        wheel: &view.wheel,
+        triangles: Count {
+            shown: part.triangles.len() as u64,
+            of: part.of,
+        },
+        positions: Count {
+            shown: path.positions.len() as u64,
+            of: path.of,
+        },
+        every: path.every,
+        samples: errors.as_ref().map(|e| Count {
+            shown: e.points.len() as u64,
+            of: e.of,
+        }),
+        classes: errors.as_ref().map(|e| (&errors::BOUNDS[..], &*e.classes)),
+        low,
+        high,
+    };
+    pack::json(out, "contents", &contents)?;
+    pack::json(out, "report", report)?;
+
+    let seen = || path.positions.iter();
+    let float = |value: Option<f64>| value.map_or(f32::NAN, |v| v as f32).to_le_bytes();
+    let place = |p: Point| pack::place(p, low, high);
+    pack::block(out, "vertices", part.points.iter().map(|&p| place(p)))?;
+    let corners = part.triangles.iter().flatten();
+    pack::block(out, "triangles", corners.map(|c| c.to_le_bytes()))?;
+    let index = |i: Index| (i.floor() as f64 + i.share()).to_le_bytes();
+    pack::block(out, "index", seen().map(|p| index(p.index)))?;
+    let heights = seen().map(|p| float(p.touch.map(|t| t.height)));
+    pack::block(out, "heights", heights)?;
+    let touched = seen().map(|p| place(p.touch.map_or(low, |t| t.contact)));
+    pack::block(out, "contacts", touched)?;
+    pack::block(out, "slopes", seen().map(|p| float(p.slope)))?;
+    pack::block(out, "bends", seen().map(|p| float(p.bend)))?;
+    if let Some(errors) = errors {
+        pack::block(out, "samples", errors.points.iter().map(|&p| place(p)))?;
+        let clearances = errors.clearances.iter().map(|&c| float(Some(c)));
+        pack::block(out, "clearances", clearances)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

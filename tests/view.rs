@@ -1,0 +1,235 @@
+//! A run's page in a real browser, from disk. Where there is none this is skipped by name.
+
+#[path = "common/browser.rs"]
+mod browser;
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use browser::Browser;
+use common::{job, sample, scratch, succeed, text};
+use serde_json::{Value, json};
+
+const ARROW_RIGHT: char = '\u{E014}';
+const PAGE_UP: char = '\u{E00E}';
+
+/// A picture of three dimensions without a graphics card.
+const WITH_WEBGL: [&str; 2] = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+
+/// Functions for what follows: `picture` draws anew and tells of the picture in three dimensions how
+/// many pixels are covered, how many are clearly red, and a sum that tells one from another.
+const LOOK: &str = "
+    window.picture = () => new Promise((resolve) => {
+        document.querySelector('#show-part').dispatchEvent(new Event('change'));
+        requestAnimationFrame(() => {
+            const canvas = document.querySelector('#solid');
+            const gl = canvas.getContext('webgl2');
+            const { width, height } = canvas;
+            const pixels = new Uint8Array(4 * width * height);
+            gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+            let [covered, red, sum] = [0, 0, 0];
+            for (let i = 0; i < pixels.length; i += 4) {
+                const [r, g, b, a] = pixels.subarray(i, i + 4);
+                if (a > 0) covered++;
+                if (a > 0 && r > g + 70 && r > b + 70) red++;
+                sum = (sum * 31 + r + 256 * g + 65536 * b) % 1000003;
+            }
+            resolve({ covered: covered / (width * height), red, sum });
+        });
+    });
+    window.choose = (id, value) => {
+        const element = document.querySelector(id);
+        element.value = value;
+        element.dispatchEvent(new Event(id === '#at' ? 'input' : 'change'));
+    };
+    window.here = (k) => document.querySelector('#here').children[k].lastElementChild.textContent;
+    window.shifts = [];
+    new PerformanceObserver((list) => {
+        for (const entry of list.getEntries()) {
+            window.shifts.push([entry.value, ...entry.sources.map(({ node }) => `${node?.nodeName}#${node?.id}`)]);
+        }
+    }).observe({ type: 'layout-shift', buffered: true });";
+
+/// Runs a job on two workers and returns its page.
+fn page(dir: &Path, job: &Path) -> PathBuf {
+    let out = dir.join("out");
+    succeed(&["run", text(job), "-q", "-w", "2", "-o", text(&out)]);
+    out.join("report.html")
+}
+
+fn open(browser: &Browser, page: &Path) {
+    browser.screen(1280, 900, "light");
+    browser.open(&format!("file://{}", text(page)));
+    browser.wait("performance.getEntriesByName('drawn').length === 1");
+    browser.ask(LOOK);
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+#[test]
+fn a_page_from_disk_shows_its_run() {
+    let Some(browser) = Browser::start(&WITH_WEBGL) else {
+        return;
+    };
+    let dir = scratch();
+    open(&browser, &page(dir.path(), &sample()));
+
+    let first = browser.ask("return picture()");
+    let covered = number(&first["covered"]);
+    assert!((0.05..0.7).contains(&covered), "{first}");
+    // But for the mark where the wheel touches.
+    assert!(number(&first["red"]) < 50.0, "nothing is gouged: {first}");
+    assert_eq!(browser.ask("return picture()"), first);
+
+    // The slider: a position by an arrow, a turn by Page Up, and the wheel goes along.
+    let at = |k: usize| browser.ask(&format!("return here({k})"));
+    let position = at(0).as_str().and_then(|p| p.parse::<u64>().ok());
+    browser.ask("document.querySelector('#at').focus()");
+    browser.press(ARROW_RIGHT);
+    browser.wait(&format!("here(0) === '{}'", position.expect("whole") + 1));
+    browser.press(PAGE_UP);
+    browser.wait(&format!("here(0) === '{}'", position.expect("whole") + 361));
+    let moved = browser.ask("choose('#at', 9000); return picture()");
+    assert_eq!(at(0), "9000");
+    assert_eq!(at(1), "2.000 mm");
+    let by = at(7);
+    assert!(
+        by.as_str().is_some_and(|by| by.ends_with(", extent 0")),
+        "{by}"
+    );
+    assert_ne!(moved["sum"], first["sum"]);
+
+    // Every choice of colours is another picture and another map.
+    let choices =
+        browser.ask("return [...document.querySelector('#colour').options].map((o) => o.value)");
+    let expected = ["errors", "height", "speed", "bend", "rim", "extent"];
+    assert_eq!(choices, json!(expected));
+    let mut seen = Vec::new();
+    for choice in expected {
+        let picture = browser.ask(&format!("choose('#colour', '{choice}'); return picture()"));
+        let map = browser.ask("return document.querySelector('#map').toDataURL()");
+        seen.push((picture["sum"].clone(), map));
+    }
+    for (i, (picture, map)) in seen.iter().enumerate() {
+        let others = seen[..i].iter();
+        assert!(
+            others.clone().all(|(p, m)| p != picture && m != map),
+            "{}",
+            expected[i]
+        );
+    }
+    let bare = browser.ask("document.querySelector('#show-wheel').click(); return picture()");
+    assert!(bare["covered"].as_f64() < Some(covered), "{bare}");
+
+    // The plot goes by the speed of the spindle: 178 turns.
+    let asked =
+        "choose('#turns', 60); document.querySelector('#turns').dispatchEvent(new Event('input'));
+        return document.querySelector('#motion-note').textContent";
+    let note = browser.ask(asked);
+    assert!(
+        note.as_str().is_some_and(|n| n.contains("takes 178 s")),
+        "{note}"
+    );
+    let before = browser.ask("return document.querySelector('#axis').toDataURL()");
+    browser.ask("choose('#span', 'turn'); return picture()");
+    assert_ne!(
+        browser.ask("return document.querySelector('#axis').toDataURL()"),
+        before
+    );
+
+    let shown = browser.ask("return document.querySelector('#shown').textContent");
+    assert!(
+        shown
+            .as_str()
+            .is_some_and(|s| s.contains("all 64,080 positions")),
+        "{shown}"
+    );
+    let tables =
+        browser.ask("return [...document.querySelectorAll('table')].map((t) => t.ariaLabel)");
+    for title in [
+        "Path",
+        "Held against the designed surface",
+        "Time",
+        "Workers",
+        "Extents",
+    ] {
+        assert!(
+            tables
+                .as_array()
+                .is_some_and(|all| all.contains(&json!(title))),
+            "{tables}"
+        );
+    }
+    assert_eq!(browser.ask("return window.shifts"), json!([]));
+    check_looks(&browser, "run");
+    assert_eq!(browser.complaints(), Vec::<Value>::new());
+}
+
+#[test]
+fn a_gouge_is_seen() {
+    let Some(browser) = Browser::start(&WITH_WEBGL) else {
+        return;
+    };
+    let dir = scratch();
+    // Points far apart, between which the wheel falls into the part.
+    let points = "[discretization]\ngrid = { rows = 50, columns = 40 }\n\
+        [digitizing]\ncontact = \"point\"\n\
+        [cutter]\nkind = \"ball\"\nradius = 6.0\n\
+        [motion]\nstep = 2.0\npoints_per_revolution = 90\n";
+    let part = sample().with_file_name("last.step");
+    let job = job(dir.path(), "job.toml", &[&part], points);
+    open(&browser, &page(dir.path(), &job));
+    let picture = browser.ask("return picture()");
+    assert!(number(&picture["red"]) > 500.0, "{picture}");
+    let said = browser.ask("return document.querySelector('#histogram').ariaLabel");
+    assert!(
+        said.as_str().is_some_and(|s| s.contains("−0.5 to −0.2 mm")),
+        "{said}"
+    );
+    check_looks(&browser, "gouged");
+    assert_eq!(browser.complaints(), Vec::<Value>::new());
+}
+
+#[test]
+fn without_webgl_the_plots_and_figures_are_there() {
+    let Some(browser) = Browser::start(&["--disable-3d-apis"]) else {
+        return;
+    };
+    let dir = scratch();
+    open(&browser, &page(dir.path(), &sample()));
+    let told = browser.ask("return document.querySelector('#no-webgl').checkVisibility()");
+    assert_eq!(told, true);
+    let drawn = "const drawn = (id) => {
+            const { width, height } = document.querySelector(id);
+            const pen = document.querySelector(id).getContext('2d');
+            return pen.getImageData(0, 0, width, height).data.filter((_, i) => i % 4 === 3).some((a) => a > 0);
+        };
+        return ['#map', '#axis', '#histogram'].map(drawn)";
+    assert_eq!(browser.ask(drawn), json!([true, true, true]));
+    browser.ask("choose('#at', 9000)");
+    browser.wait("here(0) === '9000'");
+    assert_eq!(browser.complaints(), Vec::<Value>::new());
+}
+
+/// At every width, light and dark: nothing wider than the screen, and everything to be operated has a
+/// name. Pictures of it are left in the target folder.
+fn check_looks(browser: &Browser, what: &str) {
+    for (width, height) in [(1280, 900), (390, 844)] {
+        for scheme in ["light", "dark"] {
+            browser.screen(width, height, scheme);
+            let wide = browser.ask("return document.documentElement.scrollWidth");
+            assert_eq!(wide, json!(width), "{what}, {scheme}");
+            let file = format!("view-{what}-{width}-{scheme}.png.base64");
+            let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(file);
+            std::fs::write(file, browser.picture()).expect("writable");
+        }
+    }
+    browser.screen(1280, 900, "light");
+    let nameless = "return [...document.querySelectorAll('button, input, select, section, table, canvas, a, [role]')]
+        .filter((e) => !(e.ariaLabel || e.ariaHidden || e.textContent.trim() || e.labels?.length
+            || e.getAttribute('aria-labelledby')))
+        .map((e) => e.outerHTML)";
+    assert_eq!(browser.ask(nameless), json!([]));
+}
