@@ -79,8 +79,9 @@ pub(crate) enum Command {
     ///
     /// Rays go out from the spindle; on each the machined surface is where it first meets a cutter, the
     /// designed one where it last meets a facet of the job's grid. Their difference is told along the
-    /// designed surface's normal. What lies in an undercut is not seen, and nothing is refused: to hold a
-    /// path against the designed surface there is `horma verify`.
+    /// designed surface's normal. What lies in an undercut is not seen, nor a cross-section that does not
+    /// hold the spindle, and nothing is refused: to hold a path against the designed surface there is
+    /// `horma verify`.
     #[command(after_help = "\
 Example:
   horma machined target/last/path.csv job.toml -o target/machined

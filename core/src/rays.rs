@@ -2,8 +2,9 @@
 //!
 //! A ray goes out from the spindle, square to it. The part as machined ends on it where it first meets a
 //! cutter of the path; the part as designed where it last meets a facet. What lies behind that on the same
-//! ray, an undercut, is not seen. The difference is for maps and pictures, which want one number for each
-//! place; what a path is held against is [`crate::verify()`], which knows of neither rays nor facets.
+//! ray, an undercut, is not seen, nor a cross-section that does not hold the spindle. The difference is for
+//! maps and pictures, which want one number for each place; what a path is held against is
+//! [`crate::verify()`], which knows of neither rays nor facets.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -44,7 +45,8 @@ const PROBE: f64 = 1.0e-4;
 pub struct Machined {
     /// The rays; row after row in what follows.
     pub rays: Rays,
-    /// Where the designed surface is, mm from the spindle; `None` beyond its ends.
+    /// Where the designed surface is, mm from the spindle; `None` beyond its ends and where the
+    /// spindle is outside of the part.
     pub designed: Vec<Option<f64>>,
     /// Where the machined surface is, mm from the spindle; `None` where no cutter comes.
     pub machined: Vec<Option<f64>>,
@@ -188,7 +190,8 @@ pub fn machined(
     })
 }
 
-/// Where each ray last meets a facet: what a probe touches that comes in along it.
+/// Where each ray last meets a facet: what a probe touches that comes in along it. Nothing in rows of which
+/// a ray meets none: there the spindle is outside of the part, and rays from it tell nothing.
 fn designed(rows: &[Row], rays: &Rays, simd: Simd) -> Result<Vec<Option<f64>>> {
     let probe = Job {
         // Already done.
@@ -221,6 +224,11 @@ fn designed(rows: &[Row], rays: &Rays, simd: Simd) -> Result<Vec<Option<f64>>> {
             true
         },
     );
+    for row in radii.chunks_mut(rays.columns as usize) {
+        if row.contains(&None) {
+            row.fill(None);
+        }
+    }
     Ok(radii)
 }
 
