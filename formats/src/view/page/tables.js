@@ -10,9 +10,11 @@ function make(tag, kind, ...content) {
 
 /// A table under a title: names of columns, and rows of cells, the first of which names the row.
 function table(title, columns, rows, kind = "") {
-  const head = make("tr", "", ...columns.map((name, i) => heading(name, "col", i ? "number" : "")));
+  // Words go to the left, numbers to the right, and so do their headings.
+  const words = columns.map((_, i) => rows.every((row) => /[a-z]{3}/i.test(row[i])));
+  const head = make("tr", "", ...columns.map((name, i) => heading(name, "col", i && !words[i] ? "number" : "")));
   const body = rows.map(([name, ...cells]) => {
-    const all = cells.map((cell) => make("td", columns.length && /[a-z]{3}/i.test(cell) ? "" : "number", cell ?? "–"));
+    const all = cells.map((cell, i) => make("td", words[i + 1] ? "" : "number", cell ?? "–"));
     return make("tr", "", heading(name, "row"), ...all);
   });
   const shown = columns.length ? [make("thead", "", head)] : [];
