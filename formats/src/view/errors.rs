@@ -21,7 +21,7 @@ pub struct Errors {
     pub clearances: Vec<f64>,
     /// How many samples there are.
     pub of: u64,
-    /// How many of all samples are below the first of [`BOUNDS`], between each two, and above the last.
+    /// How many of all samples are below the first bound of classes, between each two, and above the last.
     pub classes: Vec<u64>,
 }
 

@@ -10,9 +10,11 @@ function make(tag, kind, ...content) {
 
 /// A table under a title: names of columns, and rows of cells, the first of which names the row.
 function table(title, columns, rows, kind = "") {
-  const head = make("tr", "", ...columns.map((name, i) => heading(name, "col", i ? "number" : "")));
+  // Words go to the left, numbers to the right, and so do their headings.
+  const words = columns.map((_, i) => rows.every((row) => /[a-z]{3}/i.test(row[i])));
+  const head = make("tr", "", ...columns.map((name, i) => heading(name, "col", i && !words[i] ? "number" : "")));
   const body = rows.map(([name, ...cells]) => {
-    const all = cells.map((cell) => make("td", columns.length && /[a-z]{3}/i.test(cell) ? "" : "number", cell ?? "–"));
+    const all = cells.map((cell, i) => make("td", words[i + 1] ? "" : "number", cell ?? "–"));
     return make("tr", "", heading(name, "row"), ...all);
   });
   const shown = columns.length ? [make("thead", "", head)] : [];
@@ -103,6 +105,16 @@ function attemptsTable(title, attempts) {
   return table(title, ["extent", "attempt", "by", "reason"], rows, "broad");
 }
 
+function programTables({ dialect, files, seconds: time, bounds, peaks, steady }) {
+  const unit = (axis) => (axis === "rotation" ? "°" : "mm");
+  const asked = peaks.map(({ axis, velocity, acceleration, jerk }) => [axis,
+    `${rough(velocity)} ${unit(axis)}/s`, `${rough(acceleration)} ${unit(axis)}/s²`, `${rough(jerk)} ${unit(axis)}/s³`]);
+  const pairs = [["dialect", dialect], ["files", files.join(", ")], ["time at work", seconds(time)],
+    ...bounds.map(([name, share]) => [`moves held by ${name}`, percent(share)])];
+  if (steady) pairs.push(["steady spindle within the same limits", `${rough(steady.turns)} turns a minute`], ["time at that", seconds(steady.seconds)]);
+  return [table("Program", [], pairs), table("Asked of each axis at most", ["axis", "velocity", "acceleration", "jerk"], asked, "broad")];
+}
+
 /// Whatever has no table of its own: names and values, those of what lies within after their names.
 function plain(title, value) {
   return table(title, [], flat(value));
@@ -122,10 +134,11 @@ const spaced = (key) => key.replaceAll("_", " ");
 
 /// All tables, what matters most first; the narrow ones are in columns.
 function tables() {
-  const { version, job, warnings, path: figures, verification, phases, bodies, extents, lost, second, counters, traffic, window, workers, extents_from_journal, ...others } = report;
+  const { version, job, warnings, path: figures, verification, phases, bodies, extents, lost, second, counters, traffic, window, workers, extents_from_journal, program, ...others } = report;
   const all = [pathTable(figures)];
   if (warnings.length) all.unshift(table("Warnings", [], warnings.map((w) => [w])));
   if (verification) all.push(deviationTable(verification), samplesTable(verification));
+  if (program) all.push(...programTables(program));
   for (const [name, value] of Object.entries(others)) if (value) all.push(plain(spaced(name), value));
   all.push(phasesTable(phases), bodiesTable(bodies), plain("What the search cost", counters));
   if (window) all.push(plain("Windows of the local search", window));
