@@ -14,8 +14,8 @@ use horma_core::Machined;
 use crate::error::Result;
 use crate::output;
 
-/// Colours for deviations: blue where gouged, white where nothing is the matter, orange where material is
-/// left; the end of the scale and beyond is full colour.
+/// Colours for deviations, as on a run's page: red where gouged, white where nothing is the matter, blue where
+/// material is left; the end of the scale and beyond is full colour.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
     /// Deviation at which the colour is full, mm.
@@ -23,9 +23,9 @@ pub struct Scale {
 }
 
 /// Full colours of gouge and excess, and what lies between.
-const GOUGE: [f64; 3] = [5.0, 48.0, 140.0];
+const GOUGE: [f64; 3] = [192.0, 31.0, 46.0];
 const NOTHING: [f64; 3] = [247.0, 247.0, 247.0];
-const EXCESS: [f64; 3] = [196.0, 78.0, 10.0];
+const EXCESS: [f64; 3] = [28.0, 79.0, 156.0];
 /// Where nothing is measured.
 const MISSING: [u8; 3] = [208, 215, 222];
 
@@ -231,11 +231,11 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_gouge_is_blue_where_it_is() {
+    fn a_gouge_is_red_where_it_is() {
         let surface = surface();
         let scale = Scale::of(&surface);
         assert_eq!(scale.end, 0.5);
-        assert_eq!(scale.colour(surface.deviation[9]), [5, 48, 140]);
+        assert_eq!(scale.colour(surface.deviation[9]), [192, 31, 46]);
         assert_eq!(scale.colour(surface.deviation[0]), [247, 247, 247]);
         assert_eq!(scale.colour(surface.deviation[23]), MISSING);
         let svg = svg(&surface);
@@ -251,7 +251,7 @@ pub(crate) mod tests {
         reader.next_frame(&mut pixels).expect("a picture");
         // Row 1 from the left, column 1 from below.
         let pixel = |x: usize, y: usize| &pixels[3 * (y * 3 + x)..][..3];
-        assert_eq!(pixel(1, 6), [5, 48, 140]);
+        assert_eq!(pixel(1, 6), [192, 31, 46]);
         assert_eq!(pixel(2, 0), MISSING);
         assert_eq!(pixels.iter().filter(|&&p| p == 247).count(), 3 * 22);
     }
