@@ -29,7 +29,7 @@ fn names(dir: &Path) -> Vec<String> {
 fn what_an_earlier_program_left_goes() {
     let dir = scratch();
     let (job, out) = (job(dir.path(), ""), dir.path().join("out"));
-    let common = ["path.csv", "preview.png", "report.json"];
+    let common = ["path.csv", "preview.png", "report.html", "report.json"];
     let run = |args: &[&str], programs: &[&str]| {
         let mut all = vec!["run", text(&job), "-o", text(&out), "--no-verify"];
         all.extend(args);
