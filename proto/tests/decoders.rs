@@ -22,14 +22,8 @@ proptest! {
     /// Messages that are nearly right get further than noise.
     #[test]
     fn spoilt_messages_never_panic_a_decoder(
-        bytes in proptest::sample::select(good()),
-        at in any::<proptest::sample::Index>(),
-        with in vec(any::<u8>(), 0..9),
+        bytes in samples::spoilt(good()),
     ) {
-        let mut bytes = bytes;
-        let at = at.index(bytes.len());
-        let end = bytes.len().min(at + with.len());
-        bytes.splice(at..end, with);
         for (_, decode) in DECODERS {
             decode(&bytes);
         }

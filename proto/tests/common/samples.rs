@@ -3,6 +3,20 @@
 #![allow(dead_code)] // Each crate uses its part of this.
 
 use horma_proto::wire;
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::sample::{Index, select};
+
+/// One of these with some bytes of it replaced by others: what is nearly right gets further than noise.
+pub fn spoilt(good: Vec<Vec<u8>>) -> impl Strategy<Value = Vec<u8>> {
+    let parts = (select(good), any::<Index>(), vec(any::<u8>(), 0..9));
+    parts.prop_map(|(mut bytes, at, with)| {
+        let at = at.index(bytes.len());
+        let end = bytes.len().min(at + with.len());
+        bytes.splice(at..end, with);
+        bytes
+    })
+}
 
 /// Little-endian numbers.
 pub fn numbers(n: u32) -> Vec<u8> {
