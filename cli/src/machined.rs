@@ -1,14 +1,13 @@
 //! The machined surface of a path: computed, written, pictured and measured.
 
-use horma_core::{Interval, Machined, Position, Rays, Simd, Spot, discretize, place};
-use horma_formats::job::{self, Overrides};
+use horma_core::{Machined, Outline, Rays, Simd, Spot, discretize};
 use horma_formats::output::{self, Staging};
-use horma_formats::{csv, map, part, ply};
+use horma_formats::{map, ply};
 use serde::Serialize;
 
 use crate::args;
 use crate::error::Result;
-use crate::{say, system};
+use crate::{say, system, verify};
 
 /// What is told of a machined surface; lengths in mm.
 #[derive(Debug, Serialize)]
@@ -26,24 +25,16 @@ struct Figures {
 
 /// Makes the machined surface of a path from a file.
 pub(crate) fn machined(args: &args::Machined) -> Result<()> {
-    let file = job::read(&args.job, &Overrides::default())?;
-    let positions: Vec<Position> = csv::read(&args.path)?
-        .iter()
-        .map(csv::Row::position)
-        .collect();
-    let (part, _) = part::read_all(&file.files)?;
-    let part = place(part, file.axis)?;
+    let (part, file, positions) = verify::read(&args.path, &args.job)?;
     output::prepare_dir_of(&args.output, output::of_machined)?;
     let threads = args.threads.map_or_else(system::cores, usize::from);
     let surface = system::pool(threads)?.install(|| {
         let model = discretize(&part, file.job.discretization)?;
-        let outlines = model.outlines.iter();
-        let x = outlines.fold(Interval::EMPTY, |x, o| x.hull(o.x));
-        let rays = Rays::over(x, args.spacing, args.columns)?;
+        let rays = Rays::over(Outline::span(&model.outlines), args.spacing, args.columns)?;
         let cutter = &file.job.cutter;
         horma_core::machined(&model.rows, cutter, &positions, rays, Simd::best())
     })?;
-    let tolerance = crate::verify::tolerance(&file);
+    let tolerance = verify::tolerance(&file);
     let figures = figures(&surface, tolerance);
     let staging = Staging::begin_of(&args.output, output::of_machined)?;
     ply::save(&staging.file(output::MACHINED_MESH), &surface)?;

@@ -1,25 +1,20 @@
 //! Verification: a path held against the designed surface, on its own or at the end of a run.
 
+use std::path::Path;
+
 use horma_core::{
-    Clearances, Deviation, Discretization, Gouge, Part, Position, Verification, place,
-    verify_everywhere,
+    Clearances, Deviation, Discretization, Gouge, Part, Position, Verification, verify_everywhere,
 };
-use horma_formats::job::{self, JobFile};
-use horma_formats::{csv, part};
+use horma_formats::csv;
+use horma_formats::job::{JobFile, Overrides};
 
 use crate::args;
 use crate::error::{Error, Result};
-use crate::{say, system};
+use crate::{run, say, system};
 
 /// Verifies a path from a file.
 pub(crate) fn verify(args: &args::Verify) -> Result<()> {
-    let file = job::read(&args.job, &job::Overrides::default())?;
-    let positions: Vec<Position> = csv::read(&args.path)?
-        .iter()
-        .map(csv::Row::position)
-        .collect();
-    let (part, _) = part::read_all(&file.files)?;
-    let part = place(part, file.axis)?;
+    let (part, file, positions) = read(&args.path, &args.job)?;
     let threads = args.threads.map_or_else(system::cores, usize::from);
     let (verification, _) = check(&part, &file, &positions, args.spacing, threads)?;
     if args.json {
@@ -30,6 +25,13 @@ pub(crate) fn verify(args: &args::Verify) -> Result<()> {
     let tolerance = args.tolerance.or(tolerance(&file));
     let path_tolerance = file.job.motion.path_tolerance;
     tolerance.map_or(Ok(()), |t| hold(&verification, t, path_tolerance))
+}
+
+/// The positions of a path from a file, and its job with the part in place.
+pub(crate) fn read(path: &Path, job: &Path) -> Result<(Part, JobFile, Vec<Position>)> {
+    let positions = csv::read(path)?.iter().map(csv::Row::position).collect();
+    let (part, file, _) = run::read(job, &Overrides::default())?;
+    Ok((part, file, positions))
 }
 
 /// Verifies positions on `threads` threads; also tells where what was found.

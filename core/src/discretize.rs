@@ -14,7 +14,7 @@ use crate::record::BodyRecord;
 use crate::refine::refine;
 use crate::row::{Facet, Outline, Row, RowKind, facets, join};
 use crate::surface::{Direction, Surface};
-use crate::vector::{Interval, Point};
+use crate::vector::Point;
 
 /// Facets in one slab of a mesh: few enough that a worker's overlap is thin, enough that a row is
 /// worth sending.
@@ -133,7 +133,7 @@ pub(crate) fn survey(bodies: &[Layout], mut take: impl FnMut(Row)) -> Survey {
             }
         };
         join(&mut outlines);
-        let x = outlines.iter().fold(Interval::EMPTY, |x, r| x.hull(r.x));
+        let x = Outline::span(&outlines);
         survey.bodies.push(BodyRecord {
             name: (*name).to_owned(),
             rows: outlines.len() as u32,

@@ -253,8 +253,8 @@ fn lay_out<'a>(
 
 /// The positions over rows of these outlines.
 fn positions(job: &Job, outlines: &[Outline]) -> Result<Trajectory> {
-    let x = outlines.iter().fold(Interval::EMPTY, |x, r| x.hull(r.x));
-    job.motion.over(x, job.cutter.half_width())
+    job.motion
+        .over(Outline::span(outlines), job.cutter.half_width())
 }
 
 /// The name of the first mesh.

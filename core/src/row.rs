@@ -47,6 +47,13 @@ pub struct Outline {
     pub facets: u64,
 }
 
+impl Outline {
+    /// Extent along the spindle of all of these.
+    pub fn span(outlines: &[Self]) -> Interval {
+        outlines.iter().fold(Interval::EMPTY, |x, o| x.hull(o.x))
+    }
+}
+
 impl Row {
     /// Checks a row that came from outside.
     ///

@@ -6,8 +6,8 @@
 use std::time::Instant;
 
 use horma_core::{
-    Contact, Cutter, Digitizer, Discretization, Interval, Job, Method, Motion, Part, Row, Shape,
-    Simd, Trajectory, discretize,
+    Contact, Cutter, Digitizer, Discretization, Interval, Job, Method, Motion, Outline, Part, Row,
+    Shape, Simd, Trajectory, discretize,
 };
 use horma_proto::VERSION;
 use rayon::ThreadPool;
@@ -89,8 +89,8 @@ impl Model {
         let outlines = model.outlines.iter();
         Ok(Self {
             points: outlines.clone().map(|o| o.points).sum(),
-            facets: outlines.clone().map(|o| o.facets).sum(),
-            x: outlines.fold(Interval::EMPTY, |x, o| x.hull(o.x)),
+            facets: outlines.map(|o| o.facets).sum(),
+            x: Outline::span(&model.outlines),
             rows: model.rows,
         })
     }
