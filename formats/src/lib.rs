@@ -14,6 +14,8 @@ pub mod step_out;
 
 mod decimal;
 pub mod output;
+mod raster;
+mod svg;
 
 pub mod apt;
 pub mod csv;

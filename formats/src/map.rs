@@ -3,8 +3,7 @@
 //!
 //! A pixel is a ray; nothing is smoothed. The picture brings its own scale of colours.
 
-use std::fmt::Write as _;
-use std::io::Write as _;
+use std::io::Write;
 use std::path::Path;
 
 use base64::Engine as _;
@@ -12,7 +11,8 @@ use base64::engine::general_purpose::STANDARD;
 use horma_core::Machined;
 
 use crate::error::Result;
-use crate::output;
+use crate::svg::{self, line, push, text};
+use crate::{output, raster};
 
 /// Colours for deviations, as on a run's page: red where gouged, white where nothing is the matter, blue where
 /// material is left; the end of the scale and beyond is full colour.
@@ -65,13 +65,8 @@ const FRAME: [f64; 4] = [64.0, 84.0, 936.0, 460.0];
 /// Left, top, right and bottom of the scale of colours.
 const BAR: [f64; 4] = [300.0, 524.0, 700.0, 536.0];
 
-const STYLE: &str = "\
-text{font-family:system-ui,sans-serif;font-size:13px;fill:#24292f}\
-.title{font-size:17px;font-weight:600}.minor{fill:#57606a}\
-.paper{fill:#ffffff}.frame{stroke:#57606a;fill:none}.tick{stroke:#57606a}\
-image{image-rendering:pixelated}\
-@media (prefers-color-scheme:dark){\
-text{fill:#e6edf3}.minor{fill:#9da7b3}.paper{fill:#0d1117}.frame,.tick{stroke:#9da7b3}}";
+const STYLE: &str = ".tick{stroke:#57606a}image{image-rendering:pixelated}\
+@media (prefers-color-scheme:dark){.tick{stroke:#9da7b3}}";
 
 /// Writes the map to `file`: beside it first, then renamed.
 ///
@@ -83,112 +78,89 @@ pub fn save(file: &Path, surface: &Machined) -> Result<()> {
 }
 
 fn svg(surface: &Machined) -> String {
-    let [width, height] = SIZE;
     let [left, top, right, bottom] = FRAME;
     let scale = Scale::of(surface);
     let rays = &surface.rays;
-    let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
-         width=\"{width}\" height=\"{height}\" role=\"img\">\n\
-         <title>Deviation of the machined surface</title>\n<style>{STYLE}</style>\n\
-         <rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\n"
-    );
-    let mut text = |class: &str, anchor: &str, x: f64, y: f64, content: &str| {
-        let _ = writeln!(
-            out,
-            "<text class=\"{class}\" text-anchor=\"{anchor}\" x=\"{x:.1}\" y=\"{y:.1}\">{content}</text>"
-        );
-    };
-    text(
-        "title",
-        "start",
-        left,
-        32.0,
-        "Deviation of the machined surface",
-    );
+    let title = "Deviation of the machined surface";
+    let mut out = svg::begin(SIZE, title, STYLE);
+    text(&mut out, "title", "start", [left, 32.0], title);
     let subtitle = format!(
         "mm along the normal of the designed surface, on {} by {} rays from the spindle; grey where there is none",
         rays.rows, rays.columns
     );
-    text("minor", "start", left, 54.0, &subtitle);
-    let (low, high) = (
-        rays.from - rays.step / 2.0,
-        rays.from + rays.step * (f64::from(rays.rows) - 0.5),
-    );
-    let mut ticks = String::new();
+    text(&mut out, "minor", "start", [left, 54.0], &subtitle);
+    let low = rays.from - rays.step / 2.0;
+    let high = low + rays.step * f64::from(rays.rows);
     for travel in ticks_between(low, high) {
         let x = left + (right - left) * (travel - low) / (high - low);
-        text("minor", "middle", x, bottom + 20.0, &format!("{travel}"));
-        let _ = writeln!(ticks, "<path class=\"tick\" d=\"M{x:.1} {bottom}v5\"/>");
+        let label = format!("{travel}");
+        text(&mut out, "minor", "middle", [x, bottom + 20.0], &label);
+        line(&mut out, "tick", [x, bottom], [x, bottom + 5.0]);
     }
     for angle in [0, 90, 180, 270, 360] {
         let y = bottom - (bottom - top) * f64::from(angle) / 360.0;
-        text("minor", "end", left - 9.0, y + 4.5, &format!("{angle}°"));
-        let _ = writeln!(ticks, "<path class=\"tick\" d=\"M{left} {y:.1}h-5\"/>");
+        let label = format!("{angle}°");
+        text(&mut out, "minor", "end", [left - 9.0, y + 4.5], &label);
+        line(&mut out, "tick", [left - 5.0, y], [left, y]);
     }
+    let middle = (left + right) / 2.0;
     text(
+        &mut out,
         "",
         "middle",
-        (left + right) / 2.0,
-        bottom + 42.0,
+        [middle, bottom + 42.0],
         "travel, mm",
     );
-    let [bar_left, _, bar_right, bar_bottom] = BAR;
-    let end = scale.end;
-    for (share, anchor) in [(-1.0, "start"), (0.0, "middle"), (1.0, "end")] {
-        let x = (bar_left + bar_right) / 2.0 + share * (bar_right - bar_left) / 2.0;
-        text(
-            "minor",
-            anchor,
-            x,
-            bar_bottom + 16.0,
-            &format!("{:.3}", share * end),
-        );
-    }
-    text("minor", "end", bar_left - 10.0, bar_bottom, "gouge");
-    text("minor", "start", bar_right + 10.0, bar_bottom, "excess");
-    out.push_str(&ticks);
-    let picture = png(rays.rows, rays.columns, |x, y| {
+    let picture = picture((rays.rows, rays.columns), |x, y| {
         // The last column on top.
         let column = (rays.columns - 1 - y) as usize;
         let ray = x as usize * rays.columns as usize + column;
         scale.colour(surface.deviation[ray])
     });
     image(&mut out, FRAME, &picture);
-    let steps = 256;
-    let bar = png(steps, 1, |x, _| {
-        scale.colour(Some(
-            end * (2.0 * f64::from(x) / f64::from(steps - 1) - 1.0),
-        ))
-    });
-    image(&mut out, BAR, &bar);
+    bar(&mut out, &scale);
     out.push_str("</svg>\n");
     out
 }
 
-/// A picture stretched over a frame, with a line around it.
-fn image(out: &mut String, [left, top, right, bottom]: [f64; 4], png: &[u8]) {
-    let (wide, high) = (right - left, bottom - top);
-    let _ = writeln!(
-        out,
-        "<image x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\" preserveAspectRatio=\"none\" \
-         href=\"data:image/png;base64,{}\"/>\n\
-         <rect class=\"frame\" x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\"/>",
-        STANDARD.encode(png)
-    );
+/// The scale of colours, with its ends and its middle.
+fn bar(out: &mut String, scale: &Scale) {
+    let [left, _, right, bottom] = BAR;
+    for (share, anchor) in [(-1.0, "start"), (0.0, "middle"), (1.0, "end")] {
+        let x = (left + right) / 2.0 + share * (right - left) / 2.0;
+        let label = format!("{:.3}", share * scale.end);
+        text(out, "minor", anchor, [x, bottom + 16.0], &label);
+    }
+    text(out, "minor", "end", [left - 10.0, bottom], "gouge");
+    text(out, "minor", "start", [right + 10.0, bottom], "excess");
+    let steps = 256;
+    let colours = picture((steps, 1), |x, _| {
+        let share = 2.0 * f64::from(x) / f64::from(steps - 1) - 1.0;
+        scale.colour(Some(share * scale.end))
+    });
+    image(out, BAR, &colours);
 }
 
-fn png(columns: u32, rows: u32, colour: impl Fn(u32, u32) -> [u8; 3]) -> Vec<u8> {
-    let pixels = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
-    let pixels: Vec<[u8; 3]> = pixels.map(|(x, y)| colour(x, y)).collect();
-    let mut file = Vec::new();
-    let mut encoder = png::Encoder::new(&mut file, columns, rows);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder
-        .write_header()
-        .and_then(|mut writer| writer.write_image_data(pixels.as_flattened()))
-        .expect("a picture of this size can be encoded in memory");
-    file
+/// A picture stretched over a frame, with a line around it.
+fn image(out: &mut String, frame: [f64; 4], png: &[u8]) {
+    let [left, top, right, bottom] = frame;
+    let (wide, high) = (right - left, bottom - top);
+    push(
+        out,
+        format_args!(
+            "<image x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\" preserveAspectRatio=\"none\" \
+             href=\"data:image/png;base64,{}\"/>\n",
+            STANDARD.encode(png)
+        ),
+    );
+    svg::frame(out, frame);
+}
+
+fn picture(size: (u32, u32), colour: impl Fn(u32, u32) -> [u8; 3]) -> Vec<u8> {
+    let (columns, rows) = size;
+    let places = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
+    let pixels: Vec<[u8; 3]> = places.map(|(x, y)| colour(x, y)).collect();
+    raster::png(&pixels, size).expect("a picture of this size can be encoded in memory")
 }
 
 /// A few round numbers in an interval.

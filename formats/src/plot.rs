@@ -1,9 +1,8 @@
 //! Diagrams out: curves over two logarithmic axes, as SVG.
 //!
-//! The picture brings its own background and follows the reader's choice of light or dark. Text is
-//! text, in the reader's font; nothing is computed about the curves.
+//! Nothing is computed about the curves.
 
-use std::fmt::Write;
+use crate::svg::{self, escaped, line, push, text};
 
 /// A diagram.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,28 +40,19 @@ const SIZE: [f64; 2] = [720.0, 480.0];
 const FRAME: [f64; 4] = [72.0, 112.0, 696.0, 424.0];
 
 const STYLE: &str = "\
-text{font-family:system-ui,sans-serif;font-size:13px;fill:#24292f}\
-.title{font-size:17px;font-weight:600}.minor{fill:#57606a}\
-.paper{fill:#ffffff}.grid{stroke:#d8dee4;fill:none}.frame{stroke:#57606a;fill:none}\
+.grid{stroke:#d8dee4;fill:none}\
 .curve{fill:none;stroke-width:2.2;stroke-linejoin:round}.dashed{stroke-dasharray:7 4}\
 .c0{stroke:#0969da}.c1{stroke:#bc4c00}.c2{stroke:#1a7f37}.c3{stroke:#8c959f}\
 .d0{fill:#0969da}.d1{fill:#bc4c00}.d2{fill:#1a7f37}.d3{fill:#8c959f}\
-@media (prefers-color-scheme:dark){\
-text{fill:#e6edf3}.minor{fill:#9da7b3}.paper{fill:#0d1117}.grid{stroke:#30363d}.frame{stroke:#9da7b3}\
+@media (prefers-color-scheme:dark){.grid{stroke:#30363d}\
 .c0{stroke:#58a6ff}.c1{stroke:#f0883e}.c2{stroke:#3fb950}.c3{stroke:#8b949e}\
 .d0{fill:#58a6ff}.d1{fill:#f0883e}.d2{fill:#3fb950}.d3{fill:#8b949e}}";
 
 /// Draws a diagram.
 pub fn svg(plot: &Plot) -> String {
-    let [width, height] = SIZE;
+    let [_, height] = SIZE;
     let [left, top, right, bottom] = FRAME;
-    let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
-         width=\"{width}\" height=\"{height}\" role=\"img\">\n\
-         <title>{}</title>\n<style>{STYLE}</style>\n\
-         <rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\n",
-        escaped(&plot.title)
-    );
+    let mut out = svg::begin(SIZE, &plot.title, STYLE);
     text(&mut out, "title", "start", [left, 32.0], &plot.title);
     text(&mut out, "minor", "start", [left, 53.0], &plot.subtitle);
     let values = |k: usize| {
@@ -83,13 +73,7 @@ pub fn svg(plot: &Plot) -> String {
         let label = tick.label();
         text(&mut out, "minor", "end", [left - 8.0, at + 4.5], &label);
     }
-    let (wide, high) = (right - left, bottom - top);
-    push(
-        &mut out,
-        format_args!(
-            "<rect class=\"frame\" x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\"/>\n"
-        ),
-    );
+    svg::frame(&mut out, FRAME);
     let middle = [(left + right) / 2.0, (top + bottom) / 2.0];
     text(&mut out, "", "middle", [middle[0], height - 14.0], &plot.x);
     push(
@@ -221,36 +205,6 @@ fn draw(out: &mut String, curve: &Curve, places: &[[f64; 2]]) {
             format_args!("<circle class=\"d{color}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\"/>\n"),
         );
     }
-}
-
-fn line(out: &mut String, class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) {
-    push(
-        out,
-        format_args!(
-            "<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>\n"
-        ),
-    );
-}
-
-fn text(out: &mut String, class: &str, anchor: &str, [x, y]: [f64; 2], content: &str) {
-    let content = escaped(content);
-    push(
-        out,
-        format_args!(
-            "<text class=\"{class}\" text-anchor=\"{anchor}\" x=\"{x:.1}\" y=\"{y:.1}\">{content}</text>\n"
-        ),
-    );
-}
-
-fn push(out: &mut String, what: std::fmt::Arguments) {
-    // A string takes everything.
-    let _ = out.write_fmt(what);
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use horma_core::{Interval, Point, cross, dot, unit};
 
 use self::canvas::Canvas;
 use super::sheet::Sheet;
+use crate::raster;
 
 /// Size of the picture, pixels.
 pub const SIZE: (u32, u32) = (1600, 1000);
@@ -47,7 +48,7 @@ pub fn png(sheets: &[Sheet], lines: &[Polyline]) -> Vec<u8> {
     for line in lines {
         pen::draw(&mut picture, &view, &canvas, line);
     }
-    encode(picture.as_flattened()).expect("a picture of this size can be encoded in memory")
+    raster::png(&picture, SIZE).expect("a picture of this size can be encoded in memory")
 }
 
 /// Light above, darker below.
@@ -61,19 +62,6 @@ fn background() -> Vec<Colour> {
         picture.resize(picture.len() + columns, colour);
     }
     picture
-}
-
-fn encode(picture: &[u8]) -> Result<Vec<u8>, png::EncodingError> {
-    let mut file = Vec::with_capacity(picture.len() / 2);
-    let mut encoder = png::Encoder::new(&mut file, SIZE.0, SIZE.1);
-    encoder.set_color(png::ColorType::Rgb);
-    // Quick rather than small: nobody should wait for the picture.
-    encoder.set_compression(png::Compression::Fast);
-    encoder.set_filter(png::Filter::Up);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(picture)?;
-    writer.finish()?;
-    Ok(file)
 }
 
 /// From the part to the samples of the picture.

@@ -1,0 +1,66 @@
+//! What pictures in SVG have in common: their paper, their text, their lines.
+//!
+//! A picture brings its own background and follows the reader's choice of light or dark. Text is text, in
+//! the reader's font. Nothing here knows what is drawn.
+
+use std::fmt::Write;
+
+const STYLE: &str = "\
+text{font-family:system-ui,sans-serif;font-size:13px;fill:#24292f}\
+.title{font-size:17px;font-weight:600}.minor{fill:#57606a}\
+.paper{fill:#ffffff}.frame{stroke:#57606a;fill:none}\
+@media (prefers-color-scheme:dark){\
+text{fill:#e6edf3}.minor{fill:#9da7b3}.paper{fill:#0d1117}.frame{stroke:#9da7b3}}";
+
+/// The beginning of a picture of this size, with a style of its own besides the common one. It ends with
+/// `</svg>`.
+pub(crate) fn begin([width, height]: [f64; 2], title: &str, style: &str) -> String {
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
+         width=\"{width}\" height=\"{height}\" role=\"img\">\n\
+         <title>{}</title>\n<style>{STYLE}{style}</style>\n\
+         <rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\n",
+        escaped(title)
+    )
+}
+
+/// A line around a frame: left, top, right, bottom.
+pub(crate) fn frame(out: &mut String, [left, top, right, bottom]: [f64; 4]) {
+    let (wide, high) = (right - left, bottom - top);
+    push(
+        out,
+        format_args!(
+            "<rect class=\"frame\" x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\"/>\n"
+        ),
+    );
+}
+
+pub(crate) fn line(out: &mut String, class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) {
+    push(
+        out,
+        format_args!(
+            "<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>\n"
+        ),
+    );
+}
+
+pub(crate) fn text(out: &mut String, class: &str, anchor: &str, [x, y]: [f64; 2], content: &str) {
+    let content = escaped(content);
+    push(
+        out,
+        format_args!(
+            "<text class=\"{class}\" text-anchor=\"{anchor}\" x=\"{x:.1}\" y=\"{y:.1}\">{content}</text>\n"
+        ),
+    );
+}
+
+pub(crate) fn push(out: &mut String, what: std::fmt::Arguments) {
+    // A string takes everything.
+    let _ = out.write_fmt(what);
+}
+
+pub(crate) fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}
