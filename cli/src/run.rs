@@ -341,9 +341,13 @@ fn write(
     // What is to be looked at takes about as long as the rest.
     let (drawn, seen, written) = thread::scope(|scope| {
         let looking = scope.spawn(|| {
-            let drawn = preview::save(&staging.file(output::PREVIEW), part, path);
+            let sheets = preview::sheets(part);
+            let drawn = preview::save(&staging.file(output::PREVIEW), &sheets, path);
             let clearances = made.clearances.as_ref();
-            (drawn, view::view(part, &file.job.cutter, path, clearances))
+            (
+                drawn,
+                view::view(&sheets, &file.job.cutter, path, clearances),
+            )
         });
         let written = program::write(staging.dir(), path, file, &heading)?;
         going_on()?;

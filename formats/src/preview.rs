@@ -8,25 +8,24 @@ mod sheet;
 use std::io::Write;
 use std::path::Path;
 
-use horma_core::{Part, Point, ToolPath, Waypoint};
+use horma_core::{Point, ToolPath, Waypoint};
 
 use crate::error::Result;
 use crate::output;
 
 pub use render::{Colour, Polyline, SIZE, png};
-pub use sheet::Sheet;
-pub(crate) use sheet::sheets;
+pub use sheet::{Sheet, sheets};
 
 /// Colour of the line along which the cutter touches.
 pub const CONTACT: Colour = [13, 71, 161];
 /// Colour of the line along which the tool centre runs.
 pub const CENTRE: Colour = [206, 112, 76];
 
-/// Writes a picture of `part`, which lies as it is on the lathe, and of `path` around it.
+/// Writes a picture of a part, which lies as it is on the lathe, and of `path` around it.
 ///
 /// # Errors
 /// [`crate::Error::Io`], naming `file`.
-pub fn save(file: &Path, part: &Part, path: &ToolPath) -> Result<()> {
+pub fn save(file: &Path, part: &[Sheet], path: &ToolPath) -> Result<()> {
     let touches = path.waypoints().map(|w| w.touch);
     let contact: Vec<_> = touches.map(|t| t.map(|t| t.contact)).collect();
     let centre = centres(path);
@@ -42,7 +41,7 @@ pub fn save(file: &Path, part: &Part, path: &ToolPath) -> Result<()> {
             width: 0.8,
         },
     ];
-    let picture = png(&sheets(part), &lines);
+    let picture = png(part, &lines);
     output::write(file, |file| file.write_all(&picture))
 }
 
@@ -60,7 +59,7 @@ fn centres(path: &ToolPath) -> Vec<Option<Point>> {
 
 #[cfg(test)]
 mod tests {
-    use horma_core::{Body, Interval, Mesh, Motion, MotionKind, Shape, Touch};
+    use horma_core::{Body, Interval, Mesh, Motion, MotionKind, Part, Shape, Touch};
 
     use super::*;
 
@@ -107,7 +106,7 @@ mod tests {
 
         let dir = tempfile::tempdir().expect("a scratch directory");
         let file = dir.path().join("preview.png");
-        save(&file, &part, &path).expect("written");
+        save(&file, &sheets(&part), &path).expect("written");
         let bytes = std::fs::read(&file).expect("there");
         assert!(bytes.starts_with(b"\x89PNG"));
     }

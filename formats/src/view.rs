@@ -12,11 +12,12 @@ mod thin;
 use std::io::{self, Write};
 use std::path::Path;
 
-use horma_core::{Clearances, Cutter, Index, MotionKind, Part, Point, ToolPath};
+use horma_core::{Clearances, Cutter, Index, MotionKind, Point, ToolPath};
 use serde::Serialize;
 
 use crate::error::Result;
 use crate::output;
+use crate::preview::Sheet;
 use crate::report::Report;
 
 pub use errors::Errors;
@@ -56,7 +57,7 @@ pub struct Motion {
 
 /// What there is to see of a path of `cutter` around `part`, and of how it was verified.
 pub fn view(
-    part: &Part,
+    part: &[Sheet],
     cutter: &Cutter,
     path: &ToolPath,
     clearances: Option<&Clearances>,

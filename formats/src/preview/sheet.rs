@@ -25,7 +25,7 @@ const CELLS: f64 = 120.0;
 const MAX_CELLS: f64 = 1200.0;
 
 /// A sheet for each body.
-pub(crate) fn sheets(part: &Part) -> Vec<Sheet> {
+pub fn sheets(part: &Part) -> Vec<Sheet> {
     let points = || part.bodies.iter().flat_map(|body| outline(&body.shape));
     let side = |k: usize| {
         let x = Interval::of(points().map(|p| p[k]));

@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
-use horma_core::{Part, Point};
+use horma_core::Point;
 
 use super::pack;
-use crate::preview::{Sheet, sheets};
+use crate::preview::Sheet;
 
 /// Most triangles.
 const MOST: usize = 120_000;
@@ -26,11 +26,10 @@ pub struct Solid {
 
 /// The part's triangles; if they are too many, points near each other become one, in cells that grow
 /// until they are few enough.
-pub(super) fn solid(part: &Part) -> Solid {
-    let sheets = sheets(part);
+pub(super) fn solid(sheets: &[Sheet]) -> Solid {
     let of: usize = sheets.iter().map(|s| s.triangles.len()).sum();
     if of <= MOST {
-        return joined(&sheets, of);
+        return joined(sheets, of);
     }
     let (low, high) = pack::bounds(sheets.iter().flat_map(|s| s.points.iter().copied()));
     let side = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
@@ -91,7 +90,8 @@ fn clustered(sheet: &Sheet, cell: f64) -> Sheet {
 
 #[cfg(test)]
 mod tests {
-    use horma_core::{Body, Mesh, Shape};
+    use crate::preview::sheets;
+    use horma_core::{Body, Mesh, Part, Shape};
 
     use super::*;
 
@@ -113,14 +113,14 @@ mod tests {
 
     #[test]
     fn a_few_triangles_stay_as_they_are() {
-        let solid = solid(&square(10));
+        let solid = solid(&sheets(&square(10)));
         assert_eq!((solid.triangles.len(), solid.of), (200, 200));
         assert_eq!(solid.points.len(), 121);
     }
 
     #[test]
     fn many_become_fewer_and_still_cover_the_part() {
-        let solid = solid(&square(300));
+        let solid = solid(&sheets(&square(300)));
         assert_eq!(solid.of, 180_000);
         assert!((20_000..=MOST).contains(&solid.triangles.len()));
         let area: f64 = solid

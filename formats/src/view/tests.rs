@@ -1,6 +1,7 @@
-use horma_core::{Body, Mesh, Record, Shape, Touch, Trajectory};
+use horma_core::{Body, Mesh, Part, Record, Shape, Touch, Trajectory};
 
 use super::*;
+use crate::preview::sheets;
 use crate::report::PathStatistics;
 
 fn part() -> Part {
@@ -61,7 +62,7 @@ fn bytes(page: &str, id: &str) -> Vec<u8> {
 
 fn page(clearances: Option<&Clearances>) -> String {
     let cutter = Cutter::torus(40.0, 8.0).expect("valid");
-    let view = view(&part(), &cutter, &path(), clearances);
+    let view = view(&sheets(&part()), &cutter, &path(), clearances);
     let mut page = Vec::new();
     write(&mut page, &view, &report()).expect("in memory");
     String::from_utf8(page).expect("text")
