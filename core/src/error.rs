@@ -231,6 +231,22 @@ pub enum Error {
         /// Most rays.
         limit: f64,
     },
+    /// A body that is said to be the last, and is not there.
+    #[error("no body of the part is called {name:?}; there are: {known}")]
+    NoSuchBody {
+        /// What it should be called.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
+    /// Something without what a last has.
+    #[error(
+        "no {what} is found on the last; say which bodies it has, where its toe is and which way is up in [last], or give the landmark in [measures]"
+    )]
+    NotALast {
+        /// What was looked for.
+        what: &'static str,
+    },
     /// Stitching found positions that nobody delivered.
     #[error("positions {first} to {last} are missing from the path")]
     Gap {

@@ -57,6 +57,8 @@ mod verify;
 
 mod rays;
 
+mod last;
+
 mod record;
 
 pub use course::{MachineAxis, Station, course};
@@ -69,6 +71,8 @@ pub use feed::{AxisLimits, Bound, Limits, Peak, Steady, Timing, peaks, steady, t
 pub use grid::SurfaceGrid;
 pub use job::{Contact, Culling, Discretization, Distribution, Job, Local, Method};
 pub use job::{Sharing, Window};
+pub use last::{Choice, Frame, Grading, Hold, Landmark, Landmarks, Last, Measures, Scale, Shaped};
+pub use last::{Skin, System, shape};
 pub use motion::{Index, Motion, MotionKind, Trajectory};
 pub use part::{Body, Mesh, Part, Shape};
 pub use path::{Inserted, SubTrajectory, ToolPath, Touch, Waypoint, stitch};

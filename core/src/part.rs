@@ -67,15 +67,22 @@ impl Part {
     #[must_use]
     pub(crate) fn map_points(mut self, f: impl Fn(Point) -> Point) -> Self {
         for body in &mut self.bodies {
-            let points = match &mut body.shape {
-                Shape::Surface(s) => &mut s.poles,
-                Shape::Mesh(m) => &mut m.vertices,
-            };
-            for p in points {
-                *p = f(*p);
-            }
+            body.shape.map_points(&f);
         }
         self
+    }
+}
+
+impl Shape {
+    /// Applies `f` to every pole or vertex.
+    pub(crate) fn map_points(&mut self, f: impl Fn(Point) -> Point) {
+        let points = match self {
+            Self::Surface(s) => &mut s.poles,
+            Self::Mesh(m) => &mut m.vertices,
+        };
+        for p in points {
+            *p = f(*p);
+        }
     }
 }
 
@@ -132,6 +139,15 @@ impl Mesh {
             }
         }
         faces.values().filter(|&&n| n != 2).count()
+    }
+
+    /// The same with every triangle turned round.
+    #[must_use]
+    pub(crate) fn reversed(&self) -> Self {
+        Self {
+            vertices: self.vertices.clone(),
+            triangles: self.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect(),
+        }
     }
 
     /// Extent along x, mm.

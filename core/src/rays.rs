@@ -41,6 +41,10 @@ const MAX_RAYS: f64 = 4.0e6;
 /// what is on the ray.
 const PROBE: f64 = 1.0e-4;
 
+/// How far from where rays end a point may be to be taken for a point of the same surface, mm: across a
+/// sharp edge the rays around it end as far apart.
+const SAME: f64 = 1.0;
+
 /// A designed surface and what a path makes of it, ray by ray.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Machined {
@@ -79,6 +83,38 @@ impl Machined {
     /// The place of the greatest deviation.
     pub fn highest(&self) -> Option<Spot> {
         self.extreme(|a, b| a > b)
+    }
+
+    /// How far the machined surface lies outside of the designed one at a point of it, mm, between the rays
+    /// around it; `None` where these do not end at the point but elsewhere, or tell nothing.
+    pub fn at(&self, p: Point) -> Option<f64> {
+        let Rays {
+            from,
+            step,
+            rows,
+            columns,
+        } = self.rays;
+        let row = (p[0] - from) / step;
+        let angle = libm::atan2(-p[2], p[1]) / std::f64::consts::TAU;
+        let column = (angle - angle.floor()) * f64::from(columns);
+        if row < 0.0 || row > f64::from(rows - 1) {
+            return None;
+        }
+        let (row, up) = (row.floor(), row.fract());
+        let (column, on) = (column.floor(), column.fract());
+        let ray = |r: f64, c: f64| {
+            let c = c as usize % columns as usize;
+            (r.min(f64::from(rows - 1))) as usize * columns as usize + c
+        };
+        let (mut radius, mut deviation) = (0.0, 0.0);
+        for (r, share) in [(row, 1.0 - up), (row + 1.0, up)] {
+            for (c, part) in [(column, 1.0 - on), (column + 1.0, on)] {
+                let ray = ray(r, c);
+                radius += share * part * self.designed[ray]?;
+                deviation += share * part * self.deviation[ray]?;
+            }
+        }
+        ((radius - across(p)).abs() <= SAME).then_some(deviation)
     }
 
     fn extreme(&self, beyond: impl Fn(f64, f64) -> bool) -> Option<Spot> {

@@ -246,6 +246,32 @@ impl Surface {
         }
     }
 
+    /// The same surface run through the other way in v: its normal points to its other side.
+    #[must_use]
+    pub(crate) fn reversed_v(&self) -> Self {
+        let n = self.v.count();
+        let (low, high) = self.v.domain();
+        let knots = self.v.knots.iter().rev().map(|k| low + (high - k));
+        let mut reversed = Self {
+            v: Direction {
+                degree: self.v.degree,
+                knots: knots.collect(),
+            },
+            ..self.clone()
+        };
+        for row in reversed.poles.chunks_exact_mut(n) {
+            row.reverse();
+        }
+        for row in reversed
+            .weights
+            .iter_mut()
+            .flat_map(|w| w.chunks_exact_mut(n))
+        {
+            row.reverse();
+        }
+        reversed
+    }
+
     /// The surface with u the direction that runs along the spindle: the one in which the poles
     /// travel further in x.
     #[must_use]

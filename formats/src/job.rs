@@ -7,6 +7,7 @@
 
 mod digitizing;
 mod echo;
+mod last;
 mod machine;
 mod place;
 mod program;
@@ -20,6 +21,7 @@ use horma_core::{
     MotionKind, Point, Sharing, unit,
 };
 
+pub use self::last::{LastOf, Side};
 pub use self::machine::Machine;
 pub use self::place::Place;
 use self::raw::{At, Given, RawAxis, RawCutter, RawJob};
@@ -55,6 +57,8 @@ pub struct JobFile {
     pub program: Program,
     /// What the machine can do.
     pub machine: Machine,
+    /// The last in the part, if the job speaks of one.
+    pub last: Option<LastOf>,
 }
 
 /// Where a job is computed.
@@ -105,6 +109,10 @@ pub struct Overrides {
     pub feed: Option<f64>,
     /// `program.clearance`, mm
     pub clearance: Option<f64>,
+    /// The size to be made of the last
+    pub size: Option<f64>,
+    /// The side to be made of the last
+    pub side: Option<String>,
 }
 
 /// Reads the job file at `path`.
@@ -146,6 +154,7 @@ pub fn parse(text: &str, path: &Path, overrides: &Overrides) -> Result<JobFile> 
         cluster,
         program: source.program(&raw)?,
         machine: source.machine(&raw)?,
+        last: source.last(&raw)?,
     })
 }
 

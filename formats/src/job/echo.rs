@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::machine::{LIMITS, Machine};
 use super::program::{ANGLES, FEED_MODES, POINTS, UNITS};
-use super::{CONTACTS, JobFile, KINDS};
+use super::{CONTACTS, JobFile, KINDS, last};
 use crate::post::{Program, Split};
 
 impl JobFile {
@@ -43,6 +43,7 @@ impl JobFile {
             },
             "program": program_echo(&self.program),
             "machine": machine_echo(&self.machine),
+            "last": self.last.as_ref().map(last::echo),
         })
     }
 }

@@ -1,5 +1,6 @@
 //! A job as it was typed: every key optional, every value with its place.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -64,6 +65,11 @@ pub(super) struct RawJob {
     pub(super) program: RawProgram,
     #[serde(default)]
     pub(super) machine: RawMachine,
+    #[serde(default, deserialize_with = "given")]
+    pub(super) last: RawLast,
+    pub(super) grading: Option<Given<RawGrading>>,
+    #[serde(default)]
+    pub(super) measures: BTreeMap<String, Given<toml::Value>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -188,6 +194,42 @@ pub(super) struct RawAxisLimits {
     pub(super) jerk: Option<Given<f64>>,
 }
 
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawLast {
+    /// Whether the table is there at all.
+    #[serde(skip)]
+    pub(super) given: bool,
+    pub(super) bodies: Option<Given<Vec<String>>>,
+    pub(super) toe: Option<Given<String>>,
+    pub(super) up: Option<Given<[f64; 3]>>,
+    pub(super) side: Option<Given<String>>,
+    /// The size to be made, which only a flag says.
+    #[serde(skip)]
+    pub(super) size: Option<Given<f64>>,
+    /// The side to be made, likewise.
+    #[serde(skip)]
+    pub(super) side_made: Option<Given<String>>,
+}
+
+/// A table that is there.
+fn given<'de, D: Deserializer<'de>>(deserializer: D) -> Result<RawLast, D::Error> {
+    let last = RawLast::deserialize(deserializer)?;
+    Ok(RawLast {
+        given: true,
+        ..last
+    })
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawGrading {
+    pub(super) base: Option<Given<f64>>,
+    pub(super) system: Option<Given<String>>,
+    pub(super) method: Option<Given<String>>,
+    pub(super) hold: Option<Given<Vec<String>>>,
+}
+
 impl From<u32> for RawSplit {
     /// As a flag says it.
     fn from(moves: u32) -> Self {
@@ -244,6 +286,8 @@ impl RawJob {
         put(&mut self.digitizing.delta_u, "delta_u", &by.delta_u);
         put(&mut self.digitizing.delta_v, "delta_v", &by.delta_v);
         put(&mut self.digitizing.fallback, "fallback", &by.fallback);
+        put(&mut self.last.size, "size", &by.size);
+        put(&mut self.last.side_made, "side", &by.side);
         put(&mut self.program.dialect, "dialect", &by.dialect);
         put(&mut self.program.split, "split", &by.split);
         put(&mut self.program.feed, "feed", &by.feed);

@@ -1,0 +1,254 @@
+//! Shoe lasts: their measures, and the same last in other sizes and for the other foot.
+//!
+//! A last lies along the spindle. What is its toe, and which way is up, its job says; [`Frame`] turns that
+//! into coordinates of the last: along it from heel to toe, across it, and up. Measures are taken on a
+//! [`Skin`], dense triangles over the last, between [`Landmarks`] that are found on it or given. Landmarks are
+//! found once, on the last as it is in its files, and carried along to every size and side, as a last maker
+//! does it: so measures of different sizes are of the same places.
+//!
+//! Nothing here knows feet, fit or sizes of shoes: a size is so many steps from the base.
+
+mod curve;
+mod grade;
+mod landmarks;
+mod measures;
+mod skin;
+
+#[cfg(test)]
+mod tests;
+
+use crate::error::{Error, Result};
+use crate::part::{Part, Shape};
+use crate::vector::{Interval, Point, cross, dot, unit};
+
+pub use grade::{Grading, Hold, Scale, System};
+pub use landmarks::{Choice, Landmark, Landmarks};
+pub use measures::Measures;
+pub use skin::Skin;
+
+/// What is the last in a part, and how it lies there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Last {
+    /// Its bodies, by their files, their numbers there or their own names; all bodies if nothing is said.
+    pub bodies: Vec<String>,
+    /// How it lies.
+    pub frame: Frame,
+    /// Landmarks that are not to be found but are where this says.
+    pub choices: Vec<(Landmark, Choice)>,
+}
+
+/// How a last lies along the spindle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Along it, towards the toe: X or −X.
+    along: Point,
+    /// Across it, in the part frame.
+    across: Point,
+    /// From the bottom to the cone, square to the spindle.
+    up: Point,
+    /// Square to the ground: how much of it is along the last, and how much up.
+    ground: [f64; 2],
+}
+
+impl Frame {
+    /// A last with its toe at the greatest x, or else the least, and `up` the direction square to the
+    /// ground on which it would stand, in the part frame.
+    ///
+    /// # Errors
+    /// [`Error::NoDirection`] if that has no length or is along the spindle.
+    pub fn new(toe_at_greatest: bool, up: Point) -> Result<Self> {
+        let along = [if toe_at_greatest { 1.0 } else { -1.0 }, 0.0, 0.0];
+        let lost = Error::NoDirection { direction: up };
+        let ground = unit(up).ok_or(lost.clone())?;
+        let up = unit([0.0, ground[1], ground[2]]).ok_or(lost)?;
+        Ok(Self {
+            along,
+            across: cross(up, along),
+            up,
+            ground: [dot(ground, along), dot(ground, up)],
+        })
+    }
+
+    /// A point of the part frame in coordinates of the last: along, across, up.
+    fn inward(&self, p: Point) -> Point {
+        [dot(p, self.along), dot(p, self.across), dot(p, self.up)]
+    }
+
+    /// The way back.
+    fn outward(&self, [along, across, up]: Point) -> Point {
+        std::array::from_fn(|k| along * self.along[k] + across * self.across[k] + up * self.up[k])
+    }
+
+    /// How far `a` is above `b` as the last stands on the ground; coordinates of the last, mm.
+    fn above(&self, a: Point, b: Point) -> f64 {
+        self.ground[0] * (a[0] - b[0]) + self.ground[1] * (a[2] - b[2])
+    }
+}
+
+/// A last in its size and for its foot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shaped {
+    /// The part with it.
+    pub part: Part,
+    /// Its landmarks.
+    pub landmarks: Landmarks,
+    /// What it measures.
+    pub measures: Measures,
+    /// How much longer and wider it is than the base.
+    pub scale: Scale,
+    /// Where the base's ends have come to, for travels that were given for the base, mm.
+    ends: [(f64, f64); 2],
+}
+
+impl Shaped {
+    /// Where a travel of the base has come to: beside the last's ends as far from them as before.
+    pub fn travel(&self, x: f64) -> f64 {
+        let [(low, new_low), (high, new_high)] = self.ends;
+        if x <= low {
+            x - low + new_low
+        } else if x >= high {
+            x - high + new_high
+        } else {
+            new_low + (x - low) * ((new_high - new_low) / (high - low))
+        }
+    }
+}
+
+/// Makes a last of `size`, if there is one to be made, and mirrors it if it is for the other foot. The part is
+/// in place on the spindle. Bodies that are not the last keep their size, and stay at the end at which they are.
+///
+/// # Errors
+/// [`Error::NoSuchBody`], [`Error::NotALast`], [`Error::OutOfBounds`] for a size out of proportion, and those of
+/// [`crate::discretize()`].
+pub fn shape(
+    part: Part,
+    last: &Last,
+    size: Option<(&Grading, f64)>,
+    mirrored: bool,
+) -> Result<Shaped> {
+    let chosen = last.chosen(&part)?;
+    let base = last.skin(&part)?;
+    let found = landmarks::find(&base, &last.frame, &last.choices)?;
+    let measures = measures::measure(&base, &last.frame, &found)?;
+    let grade = match size {
+        Some((grading, size)) => {
+            grade::grade(grading, size, &last.frame, &base, &found, &measures)?
+        }
+        None => grade::Grade::none(),
+    };
+    let ends = last.ends(base.along());
+    let moved = last.ends(Interval::of(
+        [base.along().low, base.along().high].map(|s| grade.along(s)),
+    ));
+    let ends = [(ends.low, moved.low), (ends.high, moved.high)];
+    let mut shaped = part;
+    for (body, chosen) in shaped.bodies.iter_mut().zip(chosen) {
+        if chosen {
+            body.shape
+                .map_points(|p| last.frame.outward(grade.point(last.frame.inward(p))));
+        } else {
+            let middle = body.shape.middle();
+            let [(low, to_low), (high, to_high)] = ends;
+            let by = if middle < (low + high) / 2.0 {
+                to_low - low
+            } else {
+                to_high - high
+            };
+            body.shape.map_points(|[x, y, z]| [x + by, y, z]);
+        }
+        if mirrored {
+            body.shape = mirror(&body.shape, last.frame.across);
+        }
+    }
+    shaped.check_points()?;
+    let landmarks = found.map(|p| {
+        let [along, across, up] = grade.point(p);
+        [along, if mirrored { -across } else { across }, up]
+    });
+    let measures = if size.is_none() && !mirrored {
+        measures
+    } else {
+        measures::measure(&last.skin(&shaped)?, &last.frame, &landmarks)?
+    };
+    Ok(Shaped {
+        part: shaped,
+        landmarks,
+        measures,
+        scale: grade.scale,
+        ends,
+    })
+}
+
+impl Last {
+    /// Which bodies of a part are the last.
+    fn chosen(&self, part: &Part) -> Result<Vec<bool>> {
+        let named = |wanted: &String| part.bodies.iter().any(|b| is_called(&b.name, wanted));
+        if let Some(missing) = self.bodies.iter().find(|wanted| !named(wanted)) {
+            let known: Vec<&str> = part.bodies.iter().map(|b| &*b.name).collect();
+            return Err(Error::NoSuchBody {
+                name: missing.clone(),
+                known: known.join(", "),
+            });
+        }
+        let is = |name: &str| {
+            self.bodies.is_empty() || self.bodies.iter().any(|wanted| is_called(name, wanted))
+        };
+        Ok(part.bodies.iter().map(|b| is(&b.name)).collect())
+    }
+
+    /// The last of a part as dense triangles.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBody`], and those of [`crate::discretize()`].
+    pub fn skin(&self, part: &Part) -> Result<Skin> {
+        let chosen = self.chosen(part)?;
+        let bodies = part.bodies.iter().zip(chosen).filter(|(_, chosen)| *chosen);
+        let bodies = bodies.map(|(body, _)| body.clone()).collect();
+        Skin::of(&Part { bodies }, &self.frame)
+    }
+
+    /// Measures of a last as it lies, between landmarks that are there already.
+    ///
+    /// # Errors
+    /// [`Error::NotALast`] where there is no section to measure.
+    pub fn measure(&self, skin: &Skin, landmarks: &Landmarks) -> Result<Measures> {
+        measures::measure(skin, &self.frame, landmarks)
+    }
+
+    /// Extent in travel of an extent along the last.
+    fn ends(&self, along: Interval) -> Interval {
+        Interval::of([along.low, along.high].map(|s| s * self.frame.along[0]))
+    }
+}
+
+/// Whether a body is called so: by its file, its number there or its own name, as in
+/// `last.step: surface 1 'last'`.
+fn is_called(name: &str, wanted: &str) -> bool {
+    name.split([':', '\'']).any(|part| part.trim() == wanted)
+}
+
+/// The mirror image across the plane through the spindle that is square to `normal`. What faced outwards
+/// does so again: triangles are turned round, surfaces run the other way in v.
+fn mirror(shape: &Shape, normal: Point) -> Shape {
+    let image = |p: Point| {
+        let off = 2.0 * dot(p, normal);
+        std::array::from_fn(|k| p[k] - off * normal[k])
+    };
+    let mut mirrored = match shape {
+        Shape::Surface(surface) => Shape::Surface(surface.reversed_v()),
+        Shape::Mesh(mesh) => Shape::Mesh(mesh.reversed()),
+    };
+    mirrored.map_points(image);
+    mirrored
+}
+
+impl Shape {
+    /// The middle of its extent along the spindle, mm.
+    fn middle(&self) -> f64 {
+        let x = match self {
+            Self::Surface(surface) => Interval::of(surface.poles().iter().map(|p| p[0])),
+            Self::Mesh(mesh) => mesh.x_range(),
+        };
+        (x.low + x.high) / 2.0
+    }
+}
