@@ -1,5 +1,7 @@
 //! What can be typed.
 
+mod last;
+
 use std::fmt;
 use std::io::stdout;
 use std::path::PathBuf;
@@ -10,6 +12,7 @@ use clap_complete::Shell;
 use horma_core::{Distribution, Simd};
 use horma_formats::job::Overrides;
 
+pub(crate) use self::last::{Made, Measure, Sizes};
 use crate::traces::{self, Collector};
 
 const AFTER_HELP: &str = "\
@@ -88,6 +91,19 @@ Example:
 
 Writes machined.ply (mm, part coordinates, a deviation and a colour at each corner) and machined.svg.")]
     Machined(Machined),
+    /// Measure a shoe last: bottom length, centre line, ball girth, cone heel line, and what else there is
+    ///
+    /// Landmarks are found on the last, or taken from [measures] in the job. Given a path as well, the last is
+    /// measured as that path leaves it, too.
+    #[command(after_help = "\
+Examples:
+  horma measure job.toml                       the job's last
+  horma measure job.toml --size 39 --side left the same in another size, for the other foot
+  horma measure job.toml --path out/path.csv   as designed and as machined
+  horma measure last.stl                       a file alone: toe at the greatest x, up along z
+
+How measures and landmarks are defined says docs/lasts.md.")]
+    Measure(Measure),
     /// Look at what a run has written: tells where its report.html is, and opens it in a browser
     ///
     /// The page needs no network and can be sent to others as it is: the part with its path and the wheel
@@ -170,6 +186,8 @@ pub(crate) struct Run {
     /// Directory for path.csv, the program (path.ngc), report.json, report.html and preview.png
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub sizes: Sizes,
     /// Worker processes on this machine; 0 computes in this process
     #[arg(short, long, value_name = "N", env = "HORMA_WORKERS")]
     pub workers: Option<u32>,
@@ -199,6 +217,8 @@ pub(crate) struct Verify {
     /// Distance between samples of the surface, mm [default: such that there are about 240000]
     #[arg(long, value_name = "MM")]
     pub spacing: Option<f64>,
+    #[command(flatten)]
+    pub made: Made,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
@@ -224,6 +244,8 @@ pub(crate) struct Machined {
     /// Rays around the spindle
     #[arg(long, value_name = "N", default_value_t = 720, value_parser = clap::value_parser!(u32).range(3..=36000))]
     pub columns: u32,
+    #[command(flatten)]
+    pub made: Made,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
@@ -519,6 +541,8 @@ impl How {
             split: self.split,
             feed: self.feed,
             clearance: self.clearance,
+            size: None,
+            side: None,
         }
     }
 }

@@ -89,7 +89,12 @@ fn read(
 ) -> Result<(JobFile, String, Part)> {
     let (file, name, part) = match job {
         Some(path) => {
-            let (part, file, warnings) = run::read(path, overrides)?;
+            let run::Prepared {
+                part,
+                file,
+                warnings,
+                ..
+            } = run::read(path, overrides)?;
             for warning in warnings {
                 display.note(&format!("warning: {warning}"));
             }

@@ -107,6 +107,12 @@ pub(crate) enum Error {
     NothingToView { path: PathBuf },
     #[error("no browser opens {} ({reason}); name one with --browser, or open the page by hand", path.display())]
     NoBrowser { path: PathBuf, reason: String },
+    #[error(
+        "a size, a side or a path belongs to a job; name a job file, as in `horma measure job.toml`"
+    )]
+    MeasureNeedsJob,
+    #[error("{name}: {source}; none of the others is written either")]
+    OfSize { name: String, source: Box<Self> },
     #[error("cannot start threads: {0}")]
     Threads(String),
     #[error("interrupted")]
@@ -119,6 +125,7 @@ impl Error {
     /// 2: the input is wrong; 3: the job cannot be done; 4: the cluster failed; 130: interrupted.
     pub fn exit_code(&self) -> u8 {
         match self {
+            Self::OfSize { source, .. } => source.exit_code(),
             Self::Core(e) => of_core(e),
             Self::Formats(e) if e.is_impossible() => 3,
             Self::Impossible { .. }
@@ -143,6 +150,7 @@ impl Error {
             | Self::NoSuchJob { .. }
             | Self::OneProcess
             | Self::NothingToView { .. }
+            | Self::MeasureNeedsJob
             | Self::Traces(_)
             | Self::Unfit { here: true, .. }
             | Self::Worker(

@@ -12,7 +12,9 @@ mod client;
 mod cluster;
 mod here;
 mod jobs;
+mod lasts;
 mod machined;
+mod sizes;
 mod submit;
 mod tls;
 mod verify;
@@ -94,6 +96,7 @@ fn exit_code(ended: Result<()>) -> ExitCode {
 
 fn execute(arguments: Arguments) -> Result<()> {
     match arguments.command {
+        Command::Run(run) if run.sizes.asked() => info_span!("run").in_scope(|| sizes::run(&run)),
         Command::Run(run) => info_span!("run").in_scope(|| run::run(&run)),
         Command::Submit(submit) => info_span!("submit").in_scope(|| run::submit(&submit)),
         Command::Status(args) => jobs::status(&args),
@@ -101,6 +104,7 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Fetch(args) => run::fetch(args),
         Command::Verify(args) => verify::verify(&args),
         Command::Machined(args) => machined::machined(&args),
+        Command::Measure(args) => lasts::measure(&args),
         Command::View(args) => view::view(&args),
         Command::Master(master) => serve::master(&master),
         Command::Worker(worker) => serve::worker(worker),

@@ -25,7 +25,7 @@ struct Figures {
 
 /// Makes the machined surface of a path from a file.
 pub(crate) fn machined(args: &args::Machined) -> Result<()> {
-    let (part, file, positions) = verify::read(&args.path, &args.job)?;
+    let (part, file, positions) = verify::read(&args.path, &args.job, &args.made)?;
     output::prepare_dir_of(&args.output, output::of_machined)?;
     let threads = args.threads.map_or_else(system::cores, usize::from);
     let surface = system::pool(threads)?.install(|| {

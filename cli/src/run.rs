@@ -7,7 +7,8 @@ use std::thread;
 use std::time::Instant;
 
 use horma_core::{
-    Clearances, Counters, Method, Part, Phase, Position, Simd, ToolPath, Verification, place,
+    Clearances, Counters, Method, Part, Phase, Position, Shaped, Simd, ToolPath, Verification,
+    place,
 };
 use horma_formats::job::{self, JobFile, Overrides};
 use horma_formats::output::Staging;
@@ -15,6 +16,7 @@ use horma_formats::report::{self, PathStatistics, Report};
 use horma_formats::{csv, output, part, preview, view};
 use horma_master::{Outcome, Progress};
 use horma_proto::{VERSION, trace};
+use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
 use tracing::info_span;
 
@@ -24,13 +26,13 @@ use crate::cluster::Workers;
 use crate::error::{Error, Result};
 use crate::progress::Display;
 use crate::serve::{NOTICE, runtime};
-use crate::{cluster, here, program, say, submit, system, verify};
+use crate::{cluster, here, lasts, program, say, submit, system, verify};
 
 /// A job and where its results go.
-struct Asked<'a> {
-    file: &'a Path,
-    how: &'a How,
-    output: &'a Path,
+pub(crate) struct Asked<'a> {
+    pub file: &'a Path,
+    pub how: &'a How,
+    pub output: &'a Path,
 }
 
 /// Computes a job in this process or on local workers.
@@ -106,7 +108,7 @@ fn asked<'a>(job: &'a args::Job, output: &'a Path) -> Asked<'a> {
 
 /// Sends a job and prints its number.
 fn detach(args: &args::Job, remote: &Remote) -> Result<()> {
-    let (part, file, _) = read(&args.file, &args.how.overrides(None))?;
+    let Prepared { part, file, .. } = read(&args.file, &args.how.overrides(None))?;
     check_divisible(&file)?;
     let (name, sharing) = (name_of(&args.file), file.cluster.sharing);
     let sending = submit::send(remote, &part, file.job, sharing, &name);
@@ -160,6 +162,7 @@ fn fetch_alone(remote: &Remote, id: u64, wait: bool, output: &Path, quiet: bool)
         path: PathStatistics::of(&path, &record.counters),
         verification: None,
         program: None,
+        last: None,
         record,
     };
     let staging = Staging::begin(output)?;
@@ -197,7 +200,10 @@ fn name_of(file: &Path) -> String {
 }
 
 /// What comes of `work`, unless it is to stop.
-async fn unless<T>(stop: CancellationToken, work: impl Future<Output = Result<T>>) -> Result<T> {
+pub(crate) async fn unless<T>(
+    stop: CancellationToken,
+    work: impl Future<Output = Result<T>>,
+) -> Result<T> {
     tokio::select! {
         biased;
         () = stop.cancelled() => Err(Error::Interrupted),
@@ -205,13 +211,28 @@ async fn unless<T>(stop: CancellationToken, work: impl Future<Output = Result<T>
     }
 }
 
-/// A job with its part in place, and what there is to warn of.
-pub(crate) fn read(file: &Path, overrides: &Overrides) -> Result<(Part, JobFile, Vec<String>)> {
-    let file = job::read(file, overrides)?;
+/// A job with its part in place.
+pub(crate) struct Prepared {
+    pub part: Part,
+    pub file: JobFile,
+    /// What there is to warn of.
+    pub warnings: Vec<String>,
+    /// The last in it, if the job speaks of one.
+    pub shaped: Option<Shaped>,
+}
+
+/// Reads a job and its part, and puts the part in place.
+pub(crate) fn read(file: &Path, overrides: &Overrides) -> Result<Prepared> {
+    let mut file = job::read(file, overrides)?;
     let (part, warnings) = part::read_all(&file.files)?;
     let part = place(part, file.axis)?;
-    let warnings = warnings.iter().map(ToString::to_string).collect();
-    Ok((part, file, warnings))
+    let (part, shaped) = lasts::shaped(part, &mut file)?;
+    Ok(Prepared {
+        part,
+        file,
+        warnings: warnings.iter().map(ToString::to_string).collect(),
+        shaped,
+    })
 }
 
 /// Reads a job, has it computed, and writes its results; stops when it is interrupted, as does what
@@ -224,59 +245,12 @@ fn perform(
 ) -> Result<()> {
     let runtime = runtime()?;
     let stop = CancellationToken::new();
-    let stopping = stop.clone();
-    runtime.spawn(async move {
-        system::interrupted().await;
-        stopping.cancel();
-    });
+    stop_when_interrupted(&runtime, &stop);
     let display = Display::new(asked.how.quiet);
     let performed = runtime.block_on(async {
-        display.tell("read", 0, 0);
-        let begin = Instant::now();
-        let reading = || read(asked.file, &asked.how.overrides(workers));
-        let (part, file, warnings) = info_span!("read").in_scope(reading)?;
+        let overrides = asked.how.overrides(workers);
         output::prepare_dir(asked.output)?;
-        let read = phase("read", begin);
-        for warning in &warnings {
-            display.note(&format!("warning: {warning}"));
-        }
-        let computing = compute(part.clone(), &file, display.clone(), stop.clone());
-        let (path, mut record) = computing.await?;
-        record.phases.insert(0, read);
-        let verified = if asked.how.no_verify {
-            None
-        } else {
-            display.tell("verify", 0, 0);
-            let begin = Instant::now();
-            let threads = threads.unwrap_or_else(system::cores);
-            let verifying = verified(part.clone(), file.clone(), path.positions(), threads);
-            let verifying = trace::within(info_span!("verify"), verifying);
-            let found = tokio::select! {
-                biased;
-                () = stop.cancelled() => return Err(Error::Interrupted),
-                found = verifying => found?,
-            };
-            record.phases.push(phase("verify", begin));
-            Some(found)
-        };
-        let (verification, clearances) = verified.unzip();
-        let report = Report {
-            version: VERSION.to_owned(),
-            job: file.echo(),
-            warnings,
-            path: PathStatistics::of(&path, &record.counters),
-            verification,
-            program: None,
-            record,
-        };
-        let made = Made {
-            part,
-            file,
-            path,
-            clearances,
-        };
-        let writing = || write(asked, &made, report, &display, &stop);
-        info_span!("write").in_scope(writing)
+        carry_out(asked, &overrides, threads, &display, &stop, compute).await
     });
     // Before anything else is said, and also if nothing good came of it.
     display.finish();
@@ -286,6 +260,90 @@ fn perform(
         summarize(asked.output, &report);
     }
     Ok(())
+}
+
+/// Cancels `stop` when the user interrupts this process.
+pub(crate) fn stop_when_interrupted(runtime: &Runtime, stop: &CancellationToken) {
+    let stop = stop.clone();
+    runtime.spawn(async move {
+        system::interrupted().await;
+        stop.cancel();
+    });
+}
+
+/// Reads a job, has it computed, and writes its results into a directory that is there.
+pub(crate) async fn carry_out(
+    asked: &Asked<'_>,
+    overrides: &Overrides,
+    threads: Option<usize>,
+    display: &Display,
+    stop: &CancellationToken,
+    compute: impl AsyncFnOnce(Part, &JobFile, Display, CancellationToken) -> Result<Outcome>,
+) -> Result<Report> {
+    display.tell("read", 0, 0);
+    let begin = Instant::now();
+    let reading = || read(asked.file, overrides);
+    let prepared = info_span!("read").in_scope(reading)?;
+    let Prepared {
+        part,
+        file,
+        warnings,
+        shaped,
+    } = prepared;
+    let read = phase("read", begin);
+    for warning in &warnings {
+        display.note(&format!("warning: {warning}"));
+    }
+    let computing = compute(part.clone(), &file, display.clone(), stop.clone());
+    let (path, mut record) = computing.await?;
+    record.phases.insert(0, read);
+    let threads = threads.unwrap_or_else(system::cores);
+    let verified = if asked.how.no_verify {
+        None
+    } else {
+        display.tell("verify", 0, 0);
+        let begin = Instant::now();
+        let verifying = verified(part.clone(), file.clone(), path.positions(), threads);
+        let verifying = trace::within(info_span!("verify"), verifying);
+        let found = unless(stop.clone(), verifying).await?;
+        record.phases.push(phase("verify", begin));
+        Some(found)
+    };
+    let last = match shaped {
+        None => None,
+        Some(shaped) => {
+            display.tell("measure", 0, 0);
+            let begin = Instant::now();
+            let positions = (!asked.how.no_verify).then(|| path.positions());
+            let file = file.clone();
+            let measuring = tokio::task::spawn_blocking(move || {
+                lasts::figures(&file, &shaped, positions.as_deref(), threads)
+            });
+            let measuring = async { measuring.await.unwrap_or(Err(Error::Interrupted)) };
+            let found = unless(stop.clone(), measuring).await?;
+            record.phases.push(phase("measure", begin));
+            found
+        }
+    };
+    let (verification, clearances) = verified.unzip();
+    let report = Report {
+        version: VERSION.to_owned(),
+        job: file.echo(),
+        warnings,
+        path: PathStatistics::of(&path, &record.counters),
+        verification,
+        program: None,
+        last,
+        record,
+    };
+    let made = Made {
+        part,
+        file,
+        path,
+        clearances,
+    };
+    let writing = || write(asked, &made, report, display, stop);
+    info_span!("write").in_scope(writing)
 }
 
 /// Verifies a path beside the runtime, and refuses one that gouges deeper than the job's tolerance.
@@ -386,7 +444,7 @@ fn phase(name: &str, begin: Instant) -> Phase {
     }
 }
 
-fn progress(display: Display) -> Progress {
+pub(crate) fn progress(display: Display) -> Progress {
     Arc::new(move |phase, done, total| display.tell(phase, done, total))
 }
 

@@ -6,7 +6,7 @@ use horma_core::{
     Clearances, Deviation, Discretization, Gouge, Part, Position, Verification, verify_everywhere,
 };
 use horma_formats::csv;
-use horma_formats::job::{JobFile, Overrides};
+use horma_formats::job::JobFile;
 
 use crate::args;
 use crate::error::{Error, Result};
@@ -14,7 +14,7 @@ use crate::{run, say, system};
 
 /// Verifies a path from a file.
 pub(crate) fn verify(args: &args::Verify) -> Result<()> {
-    let (part, file, positions) = read(&args.path, &args.job)?;
+    let (part, file, positions) = read(&args.path, &args.job, &args.made)?;
     let threads = args.threads.map_or_else(system::cores, usize::from);
     let (verification, _) = check(&part, &file, &positions, args.spacing, threads)?;
     if args.json {
@@ -28,9 +28,13 @@ pub(crate) fn verify(args: &args::Verify) -> Result<()> {
 }
 
 /// The positions of a path from a file, and its job with the part in place.
-pub(crate) fn read(path: &Path, job: &Path) -> Result<(Part, JobFile, Vec<Position>)> {
+pub(crate) fn read(
+    path: &Path,
+    job: &Path,
+    made: &args::Made,
+) -> Result<(Part, JobFile, Vec<Position>)> {
     let positions = csv::read(path)?.iter().map(csv::Row::position).collect();
-    let (part, file, _) = run::read(job, &Overrides::default())?;
+    let run::Prepared { part, file, .. } = run::read(job, &made.overrides())?;
     Ok((part, file, positions))
 }
 

@@ -19,12 +19,13 @@ mod tests;
 
 use crate::error::{Error, Result};
 use crate::part::{Part, Shape};
+use crate::rays::Machined;
 use crate::vector::{Interval, Point, cross, dot, unit};
 
 pub use grade::{Grading, Hold, Scale, System};
 pub use landmarks::{Choice, Landmark, Landmarks};
 pub use measures::Measures;
-pub use skin::Skin;
+use skin::Skin;
 
 /// What is the last in a part, and how it lies there.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +43,7 @@ pub struct Last {
 pub struct Frame {
     /// Along it, towards the toe: X or −X.
     along: Point,
-    /// Across it, in the part frame.
+    /// Across it towards the foot's inner side, in the part frame.
     across: Point,
     /// From the bottom to the cone, square to the spindle.
     up: Point,
@@ -52,18 +53,22 @@ pub struct Frame {
 
 impl Frame {
     /// A last with its toe at the greatest x, or else the least, and `up` the direction square to the
-    /// ground on which it would stand, in the part frame.
+    /// ground on which it would stand, in the part frame; for the right foot or else for the left.
     ///
     /// # Errors
     /// [`Error::NoDirection`] if that has no length or is along the spindle.
-    pub fn new(toe_at_greatest: bool, up: Point) -> Result<Self> {
+    pub fn new(toe_at_greatest: bool, up: Point, right: bool) -> Result<Self> {
         let along = [if toe_at_greatest { 1.0 } else { -1.0 }, 0.0, 0.0];
         let lost = Error::NoDirection { direction: up };
         let ground = unit(up).ok_or(lost.clone())?;
         let up = unit([0.0, ground[1], ground[2]]).ok_or(lost)?;
         Ok(Self {
             along,
-            across: cross(up, along),
+            across: if right {
+                cross(up, along)
+            } else {
+                cross(along, up)
+            },
             up,
             ground: [dot(ground, along), dot(ground, up)],
         })
@@ -74,8 +79,9 @@ impl Frame {
         [dot(p, self.along), dot(p, self.across), dot(p, self.up)]
     }
 
-    /// The way back.
-    fn outward(&self, [along, across, up]: Point) -> Point {
+    /// A point given along the last, across it and up, in the part frame.
+    #[must_use]
+    pub fn outward(&self, [along, across, up]: Point) -> Point {
         std::array::from_fn(|k| along * self.along[k] + across * self.across[k] + up * self.up[k])
     }
 
@@ -121,62 +127,78 @@ impl Shaped {
 /// [`Error::NoSuchBody`], [`Error::NotALast`], [`Error::OutOfBounds`] for a size out of proportion, and those of
 /// [`crate::discretize()`].
 pub fn shape(
-    part: Part,
+    part: &Part,
     last: &Last,
     size: Option<(&Grading, f64)>,
     mirrored: bool,
 ) -> Result<Shaped> {
-    let chosen = last.chosen(&part)?;
-    let base = last.skin(&part)?;
+    let base = last.skin(part)?;
     let found = landmarks::find(&base, &last.frame, &last.choices)?;
     let measures = measures::measure(&base, &last.frame, &found)?;
-    let grade = match size {
-        Some((grading, size)) => {
-            grade::grade(grading, size, &last.frame, &base, &found, &measures)?
+    let mut correction = 0.0;
+    let mut rounds = 0..ROUNDS;
+    loop {
+        let grade = match size {
+            None => grade::Grade::none(),
+            Some((grading, size)) => {
+                let of = (&base, &found, &measures);
+                grade::grade(grading, size, &last.frame, of, correction)?
+            }
+        };
+        let (moved, ends) = move_to(part, last, &grade, base.along(), mirrored)?;
+        let landmarks = found.map(|p| {
+            let [s, w, h] = grade.point(p);
+            [s, if mirrored { -w } else { w }, h]
+        });
+        let measures = measures::measure(&last.skin(&moved)?, &last.frame, &landmarks)?;
+        let off = grade.girth.map_or(0.0, |girth| measures.ball_girth - girth);
+        if rounds.next().is_none() || off.abs() <= CLOSE {
+            return Ok(Shaped {
+                part: moved,
+                landmarks,
+                measures,
+                scale: grade.scale,
+                ends,
+            });
         }
-        None => grade::Grade::none(),
-    };
-    let ends = last.ends(base.along());
-    let moved = last.ends(Interval::of(
-        [base.along().low, base.along().high].map(|s| grade.along(s)),
+        // Poles were moved where points were meant.
+        correction -= off;
+    }
+}
+
+/// How exactly a size's ball girth is met, mm, and how often that is tried: each time is some hundred times closer.
+const CLOSE: f64 = 1.0e-3;
+const ROUNDS: usize = 4;
+
+/// The part with its last moved by `grade` and the rest with its ends, and where these have come to.
+fn move_to(
+    part: &Part,
+    last: &Last,
+    grade: &grade::Grade,
+    along: Interval,
+    mirrored: bool,
+) -> Result<(Part, [(f64, f64); 2])> {
+    let (frame, was) = (&last.frame, last.ends(along));
+    let is = last.ends(Interval::of(
+        [along.low, along.high].map(|s| grade.along(s)),
     ));
-    let ends = [(ends.low, moved.low), (ends.high, moved.high)];
-    let mut shaped = part;
-    for (body, chosen) in shaped.bodies.iter_mut().zip(chosen) {
+    let ends = [(was.low, is.low), (was.high, is.high)];
+    let mut moved = part.clone();
+    for (body, chosen) in moved.bodies.iter_mut().zip(last.chosen(part)?) {
         if chosen {
-            body.shape
-                .map_points(|p| last.frame.outward(grade.point(last.frame.inward(p))));
+            let point = |p| frame.outward(grade.point(frame.inward(p)));
+            body.shape.map_points(point);
         } else {
-            let middle = body.shape.middle();
-            let [(low, to_low), (high, to_high)] = ends;
-            let by = if middle < (low + high) / 2.0 {
-                to_low - low
-            } else {
-                to_high - high
-            };
-            body.shape.map_points(|[x, y, z]| [x + by, y, z]);
+            let ahead = body.shape.middle() > (was.low + was.high) / 2.0;
+            let (from, to) = ends[usize::from(ahead)];
+            body.shape.map_points(|[x, y, z]| [x + (to - from), y, z]);
         }
         if mirrored {
-            body.shape = mirror(&body.shape, last.frame.across);
+            body.shape = mirror(&body.shape, frame.across);
         }
     }
-    shaped.check_points()?;
-    let landmarks = found.map(|p| {
-        let [along, across, up] = grade.point(p);
-        [along, if mirrored { -across } else { across }, up]
-    });
-    let measures = if size.is_none() && !mirrored {
-        measures
-    } else {
-        measures::measure(&last.skin(&shaped)?, &last.frame, &landmarks)?
-    };
-    Ok(Shaped {
-        part: shaped,
-        landmarks,
-        measures,
-        scale: grade.scale,
-        ends,
-    })
+    moved.check_points()?;
+    Ok((moved, ends))
 }
 
 impl Last {
@@ -197,22 +219,23 @@ impl Last {
     }
 
     /// The last of a part as dense triangles.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchBody`], and those of [`crate::discretize()`].
-    pub fn skin(&self, part: &Part) -> Result<Skin> {
+    fn skin(&self, part: &Part) -> Result<Skin> {
         let chosen = self.chosen(part)?;
         let bodies = part.bodies.iter().zip(chosen).filter(|(_, chosen)| *chosen);
         let bodies = bodies.map(|(body, _)| body.clone()).collect();
         Skin::of(&Part { bodies }, &self.frame)
     }
 
-    /// Measures of a last as it lies, between landmarks that are there already.
+    /// What the last of `shaped` measures as a path leaves it, and the share of it of which that is known: its
+    /// surface is moved along its normal by as much as the machined one is off.
     ///
     /// # Errors
-    /// [`Error::NotALast`] where there is no section to measure.
-    pub fn measure(&self, skin: &Skin, landmarks: &Landmarks) -> Result<Measures> {
-        measures::measure(skin, &self.frame, landmarks)
+    /// Those of [`shape`].
+    pub fn machined(&self, shaped: &Shaped, machined: &Machined) -> Result<(Measures, f64)> {
+        let designed = self.skin(&shaped.part)?;
+        let (moved, known) = designed.machined(machined);
+        let landmarks = designed.carried(&moved, &shaped.landmarks);
+        Ok((measures::measure(&moved, &self.frame, &landmarks)?, known))
     }
 
     /// Extent in travel of an extent along the last.

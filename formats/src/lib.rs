@@ -9,6 +9,8 @@ pub mod part;
 
 pub mod inspect;
 
+pub mod lasts;
+
 pub mod sample;
 pub mod step_out;
 
@@ -25,6 +27,7 @@ pub mod ply;
 pub mod post;
 pub mod preview;
 pub mod report;
+pub mod sizes;
 pub mod view;
 
 pub use error::{Error, Result};

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use crate::error::{Error, Result};
+use crate::job::Side;
 use crate::post::Control;
 
 /// The tool path.
@@ -77,6 +78,38 @@ fn of_program(name: &str) -> bool {
             && digits.len() == 4
             && digits.bytes().all(|c| c.is_ascii_digit())
     })
+}
+
+/// What a run of several sizes and sides calls one of them, as in `37.5-left`.
+pub fn size_name(size: Option<f64>, side: Option<Side>) -> String {
+    let size = size.map(|size| size.to_string());
+    let side = side.map(|side| side.name().to_owned());
+    let both: Vec<String> = size.into_iter().chain(side).collect();
+    both.join("-")
+}
+
+/// Whether a run of several sizes and sides may give an entry of its output directory this name.
+pub fn of_sizes(name: &str) -> bool {
+    [REPORT, VIEW].contains(&name) || of_size(name)
+}
+
+/// Whether that is the name of one of them.
+fn of_size(name: &str) -> bool {
+    let (size, side) = name.rsplit_once('-').unwrap_or((name, ""));
+    let sides = [Side::Left, Side::Right].map(Side::name);
+    let is_size = |text: &str| text.parse::<f64>().is_ok_and(|s| s.to_string() == text);
+    sides.contains(&name) || is_size(name) || (sides.contains(&side) && is_size(size))
+}
+
+/// Makes `dir` ready for several sizes and sides, each with a directory of its own.
+///
+/// # Errors
+/// Those of [`prepare_dir`], also for what is in these directories.
+pub fn prepare_sizes(dir: &Path) -> Result<()> {
+    prepare_dir_of(dir, of_sizes)?;
+    let there = names(dir).map_err(|e| Error::io(dir, e))?;
+    let mut sizes = there.iter().filter(|name| of_size(name));
+    sizes.try_for_each(|name| prepare_dir(&dir.join(name)))
 }
 
 /// Whether a machined surface may give a file of its output directory this name.
@@ -181,6 +214,10 @@ impl Staging {
         let staged = names(self.dir()).map_err(|e| Error::io(self.dir(), e))?;
         for name in &staged {
             let target = self.dir.join(name);
+            // A directory of an earlier run, which held nothing else when this one began.
+            if target.is_dir() {
+                fs::remove_dir_all(&target).map_err(|e| Error::io(&target, e))?;
+            }
             fs::rename(self.file(name), &target).map_err(|e| Error::io(&target, e))?;
         }
         let there = names(&self.dir).map_err(|e| Error::io(&self.dir, e))?;
@@ -189,7 +226,12 @@ impl Staging {
             .filter(|n| (self.our)(n) && !staged.contains(n))
         {
             let stale = self.dir.join(stale);
-            fs::remove_file(&stale).map_err(|e| Error::io(&stale, e))?;
+            let removed = if stale.is_dir() {
+                fs::remove_dir_all(&stale)
+            } else {
+                fs::remove_file(&stale)
+            };
+            removed.map_err(|e| Error::io(&stale, e))?;
         }
         Ok(())
     }
@@ -334,6 +376,30 @@ mod tests {
         ] {
             assert!(!of_run(foreign), "{foreign}");
         }
+    }
+
+    #[test]
+    fn sizes_are_known_by_their_names() {
+        let names = [
+            size_name(Some(37.0), Some(Side::Left)),
+            size_name(Some(37.5), None),
+            size_name(None, Some(Side::Right)),
+        ];
+        assert_eq!(names, ["37-left", "37.5", "right"]);
+        for name in &names {
+            assert!(of_sizes(name), "{name}");
+        }
+        for foreign in ["37-both", "photos", "37.50-left", "-left", "left-37"] {
+            assert!(!of_sizes(foreign), "{foreign}");
+        }
+        let scratch = tempfile::tempdir().expect("scratch");
+        let size = scratch.path().join("37-left");
+        fs::create_dir(&size).expect("writable");
+        fs::write(size.join("letter.txt"), "dear").expect("writable");
+        let message = prepare_sizes(scratch.path())
+            .expect_err("refused")
+            .to_string();
+        assert!(message.contains("letter.txt"), "{message}");
     }
 
     #[test]

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::error::Result;
+use crate::lasts::Lasts;
 use crate::output;
 use crate::post::Program;
 
@@ -30,6 +31,9 @@ pub struct Report {
     pub verification: Option<Verification>,
     /// The program for the machine; nothing if none was written.
     pub program: Option<ProgramStatistics>,
+    /// What the last measures; nothing if the job speaks of none.
+    #[serde(default)]
+    pub last: Option<Lasts>,
     /// Phases, bodies, counters, workers, extents and lost attempts, each under its own key.
     #[serde(flatten)]
     pub record: Record,
@@ -251,6 +255,7 @@ mod tests {
             path: PathStatistics::of(&path(), &Counters::default()),
             verification: None,
             program: None,
+            last: None,
             record: Record {
                 phases: vec![Phase {
                     name: "digitize".to_owned(),

@@ -7,7 +7,7 @@
 //! applied to poles and vertices; between poles of a surface it is followed to within what a surface with
 //! these poles can, some µm on a last.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::Frame;
 use super::landmarks::{Landmark, Landmarks};
@@ -63,7 +63,7 @@ pub struct Hold {
 }
 
 /// How much larger than the base.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Scale {
     /// Along the last: λ.
     pub length: f64,
@@ -75,6 +75,8 @@ pub struct Scale {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Grade {
     pub scale: Scale,
+    /// The ball girth that is wanted, mm, unless the growth of the length decides on it.
+    pub girth: Option<f64>,
     /// Where the heel ends, mm along the base: that place stays.
     heel_end: f64,
     /// Where what is held at the heel ends, where at the toe it begins, and the tread between them, mm
@@ -101,6 +103,7 @@ impl Grade {
                 length: 1.0,
                 girth: 1.0,
             },
+            girth: None,
             heel_end: 0.0,
             zones: [0.0; 3],
             toe: 1.0,
@@ -133,14 +136,14 @@ fn smooth((gone, way): (f64, f64)) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// The map to a size.
+/// The map to a size of a last with this skin, these landmarks and these measures. Where a ball girth is aimed
+/// at, it is at one that is larger by `correction`.
 pub(super) fn grade(
     grading: &Grading,
     size: f64,
     frame: &Frame,
-    base: &Skin,
-    landmarks: &Landmarks,
-    measures: &Measures,
+    (base, landmarks, measures): (&Skin, &Landmarks, &Measures),
+    correction: f64,
 ) -> Result<Grade> {
     let steps = size - grading.base;
     let [longer, wider] = grading.system.steps();
@@ -166,6 +169,7 @@ pub(super) fn grade(
     let map = |girth: f64| {
         let mut grade = Grade {
             scale: Scale { length, girth },
+            girth: None,
             heel_end: along.low,
             zones: [
                 at(ZONES[0]),
@@ -199,7 +203,7 @@ pub(super) fn grade(
     let off = |girth: f64| {
         let grade = map(girth);
         let moved = base.mapped(|p| grade.point(p));
-        Ok(ball_girth(&moved, &landmarks.map(|p| grade.point(p)))? - wanted)
+        Ok(ball_girth(&moved, &landmarks.map(|p| grade.point(p)))? - wanted - correction)
     };
     let mut last = (1.0, off(1.0)?);
     let mut next = wanted / measures.ball_girth;
@@ -212,7 +216,10 @@ pub(super) fn grade(
         last = here;
         in_bounds(next)?;
     }
-    Ok(map(next))
+    Ok(Grade {
+        girth: Some(wanted),
+        ..map(next)
+    })
 }
 
 /// What is held lies within the zone at the toe.

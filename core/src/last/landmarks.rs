@@ -21,11 +21,10 @@ pub enum Landmark {
     Toe,
     /// Where the last stands: its lowest place at the ball.
     Tread,
-    /// The widest place at the ball, across the last to the one side: for an upright last with its toe
-    /// ahead, the left.
-    BallLeft,
-    /// The same to the other side.
-    BallRight,
+    /// The widest place at the ball on the foot's inner side.
+    BallInner,
+    /// The same on its outer side.
+    BallOuter,
     /// The top of the ball's section.
     Vamp,
     /// The corner between cone and instep.
@@ -38,8 +37,8 @@ impl Landmark {
         Self::Heel,
         Self::Toe,
         Self::Tread,
-        Self::BallLeft,
-        Self::BallRight,
+        Self::BallInner,
+        Self::BallOuter,
         Self::Vamp,
         Self::Instep,
     ];
@@ -50,8 +49,8 @@ impl Landmark {
             Self::Heel => "heel",
             Self::Toe => "toe",
             Self::Tread => "tread",
-            Self::BallLeft => "ball_left",
-            Self::BallRight => "ball_right",
+            Self::BallInner => "ball_inner",
+            Self::BallOuter => "ball_outer",
             Self::Vamp => "vamp",
             Self::Instep => "instep",
         }
@@ -155,8 +154,8 @@ pub(super) fn find(
         )
     };
     let [left, right] = [
-        ball(Landmark::BallLeft, 1.0)?,
-        ball(Landmark::BallRight, -1.0)?,
+        ball(Landmark::BallInner, 1.0)?,
+        ball(Landmark::BallOuter, -1.0)?,
     ];
     let vamp = place(Landmark::Vamp, &top_at, &|| {
         let section = skin.section(&upright(left, right)?);

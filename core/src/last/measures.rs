@@ -40,6 +40,23 @@ pub struct Measures {
 pub(super) const TOE_THICKNESS: f64 = 0.95;
 
 impl Measures {
+    /// Each less the other's, mm.
+    #[must_use]
+    pub fn less(&self, other: &Self) -> Self {
+        Self {
+            length: self.length - other.length,
+            bottom_length: self.bottom_length - other.bottom_length,
+            bottom_length_taped: self.bottom_length_taped - other.bottom_length_taped,
+            centre_line: self.centre_line - other.centre_line,
+            ball_girth: self.ball_girth - other.ball_girth,
+            ball_width: self.ball_width - other.ball_width,
+            cone_heel_line: self.cone_heel_line - other.cone_heel_line,
+            heel_height: self.heel_height - other.heel_height,
+            toe_spring: self.toe_spring - other.toe_spring,
+            toe_thickness: self.toe_thickness - other.toe_thickness,
+        }
+    }
+
     /// Each with its name, in their order.
     pub fn named(&self) -> [(&'static str, f64); 10] {
         [
@@ -78,7 +95,7 @@ pub(super) fn measure(skin: &Skin, frame: &Frame, landmarks: &Landmarks) -> Resu
         bottom_length_taped: stretch(&under),
         centre_line: stretch(&curve.between(toe, heel)),
         ball_girth: ball_girth(skin, landmarks)?,
-        ball_width: (place(Landmark::BallLeft)[1] - place(Landmark::BallRight)[1]).abs(),
+        ball_width: (place(Landmark::BallInner)[1] - place(Landmark::BallOuter)[1]).abs(),
         cone_heel_line: girth(skin, across(landmarks), "cone heel line")?,
         heel_height: frame.above(place(Landmark::Heel), place(Landmark::Tread)),
         toe_spring: frame.above(place(Landmark::Toe), place(Landmark::Tread)),
@@ -89,7 +106,7 @@ pub(super) fn measure(skin: &Skin, frame: &Frame, landmarks: &Landmarks) -> Resu
 /// A tape around the ball.
 pub(super) fn ball_girth(skin: &Skin, landmarks: &Landmarks) -> Result<f64> {
     let [left, right, vamp] =
-        [Landmark::BallLeft, Landmark::BallRight, Landmark::Vamp].map(|l| landmarks.get(l));
+        [Landmark::BallInner, Landmark::BallOuter, Landmark::Vamp].map(|l| landmarks.get(l));
     girth(skin, Plane::through(left, right, vamp), "ball")
 }
 

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::Frame;
 use super::curve::join;
+use super::landmarks::Landmarks;
 use crate::discretize::discretize;
 use crate::error::Result;
 use crate::job::Discretization;
@@ -16,7 +17,7 @@ const FINENESS: f64 = 0.0025;
 
 /// Dense triangles over a last, in its own coordinates.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Skin {
+pub(super) struct Skin {
     /// Corners, each place once.
     pub(super) points: Vec<Point>,
     triangles: Vec<[u32; 3]>,
@@ -121,9 +122,19 @@ impl Skin {
         )
     }
 
+    /// Landmarks on this skin where they have come to on one that was `moved`: as its nearest corners.
+    pub(super) fn carried(&self, moved: &Self, landmarks: &Landmarks) -> Landmarks {
+        landmarks.map(|place| {
+            let off = |p: &Point| length(sub(*p, place));
+            let pairs = self.points.iter().zip(&moved.points);
+            let nearest = pairs.min_by(|a, b| off(a.0).total_cmp(&off(b.0)));
+            nearest.map_or(place, |(was, is)| add_scaled(place, 1.0, sub(*is, *was)))
+        })
+    }
+
     /// What a path makes of it: every corner moved along the surface's normal by as much as the machined
     /// surface is off there, and the share of the corners of which that is known.
-    pub fn machined(&self, machined: &Machined) -> (Self, f64) {
+    pub(super) fn machined(&self, machined: &Machined) -> (Self, f64) {
         let mut normals = vec![[0.0; 3]; self.points.len()];
         for t in &self.triangles {
             let [a, b, c] = t.map(|v| self.points[v as usize]);

@@ -57,7 +57,7 @@ fn ellipse(a: f64, b: f64) -> f64 {
 fn upright_last(choices: &[(Landmark, Choice)]) -> Last {
     Last {
         bodies: Vec::new(),
-        frame: Frame::new(true, [0.0, 0.0, 1.0]).expect("up"),
+        frame: Frame::new(true, [0.0, 0.0, 1.0], true).expect("up"),
         choices: choices.to_vec(),
     }
 }
@@ -74,12 +74,12 @@ fn an_ellipsoid_measures_what_closed_forms_say() {
         at(Landmark::Heel, -a, 0.0, 0.0),
         at(Landmark::Toe, a, 0.0, 0.0),
         at(Landmark::Tread, 0.0, 0.0, -c),
-        at(Landmark::BallLeft, 0.0, b, 0.0),
-        at(Landmark::BallRight, 0.0, -b, 0.0),
+        at(Landmark::BallInner, 0.0, b, 0.0),
+        at(Landmark::BallOuter, 0.0, -b, 0.0),
         at(Landmark::Vamp, 0.0, 0.0, c),
         at(Landmark::Instep, 0.0, 0.0, c),
     ]);
-    let measures = shape(ellipsoid([a, b, c]), &last, None, false)
+    let measures = shape(&ellipsoid([a, b, c]), &last, None, false)
         .expect("a last")
         .measures;
     close(measures.length, 2.0 * a, 1e-9, "length");
@@ -127,11 +127,11 @@ fn a_cylinder_measures_what_closed_forms_say() {
     let last = upright_last(&[
         share(Landmark::Heel, 0.1),
         share(Landmark::Toe, 0.9),
-        share(Landmark::BallLeft, 0.6),
-        share(Landmark::BallRight, 0.7),
+        share(Landmark::BallInner, 0.6),
+        share(Landmark::BallOuter, 0.7),
         share(Landmark::Instep, 0.5),
     ]);
-    let measures = shape(part, &last, None, false).expect("a last").measures;
+    let measures = shape(&part, &last, None, false).expect("a last").measures;
     close(measures.bottom_length, 160.0, 1e-6, "bottom length");
     close(measures.toe_thickness, 60.0, 0.001, "thickness");
     // The ball's plane goes aslant: 20 mm along over 60 across.
@@ -187,7 +187,7 @@ fn grading(geometric: bool, hold: Hold) -> Grading {
 #[test]
 fn a_paris_point_is_two_thirds_of_a_centimetre_and_half_a_centimetre_of_girth() {
     let last = upright_last(&[]);
-    let base = shape(like_a_last(), &last, None, false).expect("a last");
+    let base = shape(&like_a_last(), &last, None, false).expect("a last");
     let held = Hold {
         heel_height: true,
         toe_spring: true,
@@ -197,7 +197,7 @@ fn a_paris_point_is_two_thirds_of_a_centimetre_and_half_a_centimetre_of_girth() 
         for steps in [-1.5, 1.0, 4.0] {
             let grading = grading(false, hold);
             let size = Some((&grading, 37.0 + steps));
-            let other = shape(like_a_last(), &last, size, false).expect("a last");
+            let other = shape(&like_a_last(), &last, size, false).expect("a last");
             let (was, is) = (base.measures, other.measures);
             close(is.length, was.length + steps * 20.0 / 3.0, 1e-6, "length");
             close(is.ball_girth, was.ball_girth + steps * 5.0, 1e-6, "girth");
@@ -223,7 +223,7 @@ fn a_paris_point_is_two_thirds_of_a_centimetre_and_half_a_centimetre_of_girth() 
 fn geometric_sizes_grow_by_the_same_share() {
     let last = upright_last(&[]);
     let grading = grading(true, Hold::default());
-    let at = |size| shape(like_a_last(), &last, Some((&grading, size)), false).expect("a last");
+    let at = |size| shape(&like_a_last(), &last, Some((&grading, size)), false).expect("a last");
     let [base, one, two] = [37.0, 38.0, 39.0].map(|size| at(size).measures);
     close(one.length, base.length + 20.0 / 3.0, 1e-9, "length");
     for (((name, base), (_, one)), (_, two)) in
@@ -231,7 +231,7 @@ fn geometric_sizes_grow_by_the_same_share() {
     {
         close(one / base, two / one, 1e-9, name);
     }
-    let small = shape(like_a_last(), &last, Some((&grading, -200.0)), false);
+    let small = shape(&like_a_last(), &last, Some((&grading, -200.0)), false);
     assert!(matches!(
         small,
         Err(Error::OutOfBounds {
@@ -245,7 +245,7 @@ fn geometric_sizes_grow_by_the_same_share() {
 fn the_other_foot_measures_the_same_and_faces_outwards() {
     let last = upright_last(&[]);
     let [right, left] =
-        [false, true].map(|m| shape(like_a_last(), &last, None, m).expect("a last"));
+        [false, true].map(|m| shape(&like_a_last(), &last, None, m).expect("a last"));
     for ((name, a), (_, b)) in right.measures.named().iter().zip(left.measures.named()) {
         close(*a, b, 1e-9, name);
     }
@@ -289,7 +289,7 @@ fn what_is_not_the_last_keeps_its_size_and_its_end() {
         ..upright_last(&[])
     };
     let grading = grading(false, Hold::default());
-    let shaped = shape(part.clone(), &last, Some((&grading, 40.0)), false).expect("a last");
+    let shaped = shape(&part, &last, Some((&grading, 40.0)), false).expect("a last");
     let range = |k: usize| match &shaped.part.bodies[k].shape {
         Shape::Mesh(mesh) => mesh.x_range(),
         Shape::Surface(_) => unreachable!("a mesh"),
@@ -303,6 +303,6 @@ fn what_is_not_the_last_keeps_its_size_and_its_end() {
         bodies: vec!["boot".to_owned()],
         ..last
     };
-    let error = shape(part, &nobody, None, false).expect_err("nobody");
+    let error = shape(&part, &nobody, None, false).expect_err("nobody");
     assert!(error.to_string().contains("heel holder"), "{error}");
 }

@@ -79,11 +79,11 @@ impl Source<'_> {
         }
         let up = section.up.as_ref().map_or([0.0, 0.0, 1.0], |g| g.value);
         let toe_at_greatest = self.choose(section.toe.as_ref(), "toe", true, &TOES)?;
-        let frame = Frame::new(toe_at_greatest, up).map_err(|_| {
+        let files_side = self.choose(section.side.as_ref(), "side", Side::Right, &SIDES)?;
+        let frame = Frame::new(toe_at_greatest, up, files_side == Side::Right).map_err(|_| {
             let what = "up must be a direction [x, y, z] that is not along the spindle";
             self.wrong(section.up.as_ref().map(|g| &g.at), what)
         })?;
-        let files_side = self.choose(section.side.as_ref(), "side", Side::Right, &SIDES)?;
         let grading = raw.grading.as_ref().map(|g| self.grading(g)).transpose()?;
         let size = match (size, &grading) {
             (Some(given), None) => {

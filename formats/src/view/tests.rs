@@ -44,6 +44,7 @@ fn report() -> Report {
         path: PathStatistics::of(&path(), &record.counters),
         verification: None,
         program: None,
+        last: None,
         record,
     }
 }

@@ -1,0 +1,132 @@
+//! A last in a job: in its size and for its side, measured as designed and as machined.
+
+use std::path::Path;
+
+use horma_core::{
+    Discretization, Frame, Last, Machined, Outline, Part, Position, Rays, Shaped, Simd, discretize,
+    place, shape,
+};
+use horma_formats::job::{JobFile, Side};
+use horma_formats::lasts::Lasts;
+use horma_formats::{csv, part};
+
+use crate::args;
+use crate::error::{Error, Result};
+use crate::{run, say, system};
+
+/// Rays for the machined last: distance along the spindle, mm, and number around it.
+const RAYS: (f64, u32) = (0.5, 720);
+
+/// Puts the last that a job speaks of into the size and onto the side that are asked for; travels that the
+/// job gives go with it.
+pub(crate) fn shaped(part: Part, file: &mut JobFile) -> Result<(Part, Option<Shaped>)> {
+    let Some(of) = &file.last else {
+        return Ok((part, None));
+    };
+    let shaped = shape(&part, &of.last, of.graded(), of.mirrored())?;
+    let motion = &mut file.job.motion;
+    for travel in [&mut motion.from, &mut motion.to] {
+        *travel = travel.map(|x| shaped.travel(x));
+    }
+    Ok((shaped.part.clone(), Some(shaped)))
+}
+
+/// The figures of a job's last, as machined by `positions` if there are any.
+pub(crate) fn figures(
+    file: &JobFile,
+    shaped: &Shaped,
+    positions: Option<&[Position]>,
+    threads: usize,
+) -> Result<Option<Lasts>> {
+    let Some(of) = &file.last else {
+        return Ok(None);
+    };
+    let machined = positions.map(|positions| {
+        system::pool(threads)?.install(|| {
+            let surface = rays(&shaped.part, file, positions)?;
+            Ok::<_, Error>(of.last.machined(shaped, &surface)?)
+        })
+    });
+    Ok(Some(Lasts::of(
+        shaped,
+        &of.last.frame,
+        machined.transpose()?,
+    )))
+}
+
+fn rays(part: &Part, file: &JobFile, positions: &[Position]) -> Result<Machined> {
+    // The designed surface is compared with, so its facets have to be fine, whatever the path was made of.
+    let fine = match file.job.discretization {
+        Discretization::Tolerance(tolerance) => tolerance.min(FINE),
+        Discretization::Grid { .. } => FINE,
+    };
+    let model = discretize(part, Discretization::Tolerance(fine))?;
+    let rays = Rays::over(Outline::span(&model.outlines), RAYS.0, RAYS.1)?;
+    let (rows, cutter) = (&model.rows, &file.job.cutter);
+    Ok(horma_core::machined(
+        rows,
+        cutter,
+        positions,
+        rays,
+        Simd::best(),
+    )?)
+}
+
+/// Chordal tolerance of the designed surface that a machined one is measured against, mm.
+const FINE: f64 = 0.01;
+
+/// Measures a last.
+pub(crate) fn measure(args: &args::Measure) -> Result<()> {
+    let is_job = |file: &Path| file.extension().is_some_and(|e| e == "toml");
+    let lasts = match &*args.files {
+        [job] if is_job(job) => of_job(args, job)?,
+        files => {
+            if args.path.is_some() || args.made.size.is_some() || args.made.side.is_some() {
+                return Err(Error::MeasureNeedsJob);
+            }
+            let (part, _) = part::read_all(files)?;
+            let last = Last {
+                bodies: Vec::new(),
+                frame: Frame::new(true, [0.0, 0.0, 1.0], true)?,
+                choices: Vec::new(),
+            };
+            let shaped = shape(
+                &place(part, horma_core::Axis::default())?,
+                &last,
+                None,
+                false,
+            )?;
+            Lasts::of(&shaped, &last.frame, None)
+        }
+    };
+    say(&if args.json {
+        serde_json::to_string_pretty(&lasts).unwrap_or_default()
+    } else {
+        lasts.describe()
+    });
+    Ok(())
+}
+
+fn of_job(args: &args::Measure, job: &Path) -> Result<Lasts> {
+    let mut overrides = args.made.overrides();
+    // A job that does not speak of a last is taken to be one, as it is in its files.
+    if overrides.side.is_none() && horma_formats::job::read(job, &overrides)?.last.is_none() {
+        overrides.side = Some(Side::Right.name().to_owned());
+    }
+    let run::Prepared { file, shaped, .. } = run::read(job, &overrides)?;
+    let positions = match &args.path {
+        None => None,
+        Some(path) => Some(
+            csv::read(path)?
+                .iter()
+                .map(csv::Row::position)
+                .collect::<Vec<_>>(),
+        ),
+    };
+    let threads = args.threads.map_or_else(system::cores, usize::from);
+    let found = match &shaped {
+        Some(shaped) => figures(&file, shaped, positions.as_deref(), threads)?,
+        None => None,
+    };
+    found.ok_or(Error::MeasureNeedsJob)
+}
