@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::{run, say, system};
 
 /// Rays for the machined last: distance along the spindle, mm, and number around it.
-const RAYS: (f64, u32) = (0.5, 720);
+const RAYS: (f64, u32) = (0.5, 360);
 
 /// Puts the last that a job speaks of into the size and onto the side that are asked for; travels that the
 /// job gives go with it.
@@ -44,7 +44,7 @@ pub(crate) fn figures(
     let machined = positions.map(|positions| {
         system::pool(threads)?.install(|| {
             let surface = rays(&shaped.part, file, positions)?;
-            Ok::<_, Error>(of.last.machined(shaped, &surface)?)
+            Ok::<_, Error>(of.last.machined(shaped, &surface, file.job.motion.step)?)
         })
     });
     Ok(Some(Lasts::of(

@@ -134,7 +134,7 @@ pub fn shape(
 ) -> Result<Shaped> {
     let base = last.skin(part)?;
     let found = landmarks::find(&base, &last.frame, &last.choices)?;
-    let measures = measures::measure(&base, &last.frame, &found)?;
+    let measures = measures::measure(&base, &last.frame, &found, base.along())?;
     let mut correction = 0.0;
     let mut rounds = 0..ROUNDS;
     loop {
@@ -150,7 +150,8 @@ pub fn shape(
             let [s, w, h] = grade.point(p);
             [s, if mirrored { -w } else { w }, h]
         });
-        let measures = measures::measure(&last.skin(&moved)?, &last.frame, &landmarks)?;
+        let skin = last.skin(&moved)?;
+        let measures = measures::measure(&skin, &last.frame, &landmarks, skin.along())?;
         let off = grade.girth.map_or(0.0, |girth| measures.ball_girth - girth);
         if rounds.next().is_none() || off.abs() <= CLOSE {
             return Ok(Shaped {
@@ -227,15 +228,24 @@ impl Last {
     }
 
     /// What the last of `shaped` measures as a path leaves it, and the share of it of which that is known: its
-    /// surface is moved along its normal by as much as the machined one is off.
+    /// surface is moved along its normal by as much as the machined one is off. A tape lies on the ridges
+    /// between turns of the path, `step` apart, mm.
     ///
     /// # Errors
     /// Those of [`shape`].
-    pub fn machined(&self, shaped: &Shaped, machined: &Machined) -> Result<(Measures, f64)> {
+    pub fn machined(
+        &self,
+        shaped: &Shaped,
+        machined: &Machined,
+        step: f64,
+    ) -> Result<(Measures, f64)> {
+        let machined = machined.bridged(step, LEFT);
         let designed = self.skin(&shaped.part)?;
-        let (moved, known) = designed.machined(machined);
+        let (moved, known) = designed.machined(&machined);
         let landmarks = designed.carried(&moved, &shaped.landmarks);
-        Ok((measures::measure(&moved, &self.frame, &landmarks)?, known))
+        let along = designed.along();
+        let measures = measures::measure(&moved, &self.frame, &landmarks, along)?;
+        Ok((measures, known))
     }
 
     /// Extent in travel of an extent along the last.
@@ -249,6 +259,10 @@ impl Last {
 fn is_called(name: &str, wanted: &str) -> bool {
     name.split([':', '\'']).any(|part| part.trim() == wanted)
 }
+
+/// What is left more than this, mm, is out of the cutter's reach, beside a holder or in an undercut: it is not
+/// machined, and goes by hand.
+const LEFT: f64 = 0.2;
 
 /// The mirror image across the plane through the spindle that is square to `normal`. What faced outwards
 /// does so again: triangles are turned round, surfaces run the other way in v.

@@ -117,6 +117,26 @@ impl Machined {
         ((radius - across(p)).abs() <= SAME).then_some(deviation)
     }
 
+    /// The same as a tape of this width along the spindle feels it: everywhere as high as the highest place
+    /// beneath it. Places with more than `left`, mm, tell nothing any more.
+    #[must_use]
+    pub fn bridged(&self, width: f64, left: f64) -> Self {
+        let columns = self.rays.columns as usize;
+        let wide = (width / (2.0 * self.rays.step)).ceil().clamp(0.0, 1000.0) as usize;
+        let known = |ray: usize| self.deviation[ray].filter(|&d| d <= left);
+        let highest = |ray: usize| {
+            known(ray)?;
+            let first = (ray / columns).saturating_sub(wide) * columns + ray % columns;
+            let last = ray + wide * columns;
+            let beneath = (first..self.deviation.len().min(last + 1)).step_by(columns);
+            beneath.filter_map(known).reduce(f64::max)
+        };
+        Self {
+            deviation: (0..self.deviation.len()).map(highest).collect(),
+            ..self.clone()
+        }
+    }
+
     fn extreme(&self, beyond: impl Fn(f64, f64) -> bool) -> Option<Spot> {
         let mut found: Option<(usize, f64)> = None;
         for (ray, deviation) in self.deviation.iter().enumerate() {

@@ -7,7 +7,7 @@ use super::curve::Loop;
 use super::landmarks::{Landmark, Landmarks, begin_at_lowest};
 use super::skin::{Plane, Skin, hull, stretch, tape};
 use crate::error::{Error, Result};
-use crate::vector::{Point, add_scaled, sub};
+use crate::vector::{Interval, Point, add_scaled, sub};
 
 /// What is measured on a last, mm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -74,8 +74,13 @@ impl Measures {
     }
 }
 
-/// Takes all measures.
-pub(super) fn measure(skin: &Skin, frame: &Frame, landmarks: &Landmarks) -> Result<Measures> {
+/// Takes all measures. The toe is as thick as it is where that is measured on a last that extends over `along`.
+pub(super) fn measure(
+    skin: &Skin,
+    frame: &Frame,
+    landmarks: &Landmarks,
+    along: Interval,
+) -> Result<Measures> {
     let curve = median(skin, frame)?;
     let at = |landmark| {
         let [s, _, h] = landmarks.get(landmark);
@@ -84,13 +89,12 @@ pub(super) fn measure(skin: &Skin, frame: &Frame, landmarks: &Landmarks) -> Resu
     let [heel, toe] = [at(Landmark::Heel), at(Landmark::Toe)];
     let bottom = curve.between(heel, toe);
     let [under, _] = hull(bottom.clone());
-    let along = skin.along();
-    let length = along.high - along.low;
-    let thick = curve.crossed(along.low + TOE_THICKNESS * length);
+    let own = skin.along();
+    let thick = curve.crossed(along.low + TOE_THICKNESS * (along.high - along.low));
     let [low, high] = thick.ok_or(Error::NotALast { what: "toe" })?;
     let place = |landmark| landmarks.get(landmark);
     Ok(Measures {
-        length,
+        length: own.high - own.low,
         bottom_length: stretch(&bottom),
         bottom_length_taped: stretch(&under),
         centre_line: stretch(&curve.between(toe, heel)),

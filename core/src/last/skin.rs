@@ -133,7 +133,7 @@ impl Skin {
     }
 
     /// What a path makes of it: every corner moved along the surface's normal by as much as the machined
-    /// surface is off there, and the share of the corners of which that is known.
+    /// surface is off there, and the share of the corners of which that is known; the rest stays.
     pub(super) fn machined(&self, machined: &Machined) -> (Self, f64) {
         let mut normals = vec![[0.0; 3]; self.points.len()];
         for t in &self.triangles {
