@@ -154,7 +154,7 @@ pub(super) fn grade(
         1.0 + steps * longer / measures.length
     };
     let in_bounds = |growth: f64| {
-        let ok = growth >= GROWTH[0] && growth <= GROWTH[1];
+        let ok = (GROWTH[0]..=GROWTH[1]).contains(&growth);
         bounded(
             "size",
             size,

@@ -181,10 +181,10 @@ fn curves(beside: &mut BTreeMap<(u32, u32), Vec<(u32, u32)>>) -> Vec<Vec<(u32, u
         let mut curve = vec![start];
         let mut here = start;
         while let Some(next) = beside.get_mut(&here).and_then(Vec::pop) {
-            if let Some(back) = beside.get_mut(&next) {
-                if let Some(found) = back.iter().position(|&edge| edge == here) {
-                    back.swap_remove(found);
-                }
+            if let Some(back) = beside.get_mut(&next)
+                && let Some(found) = back.iter().position(|&edge| edge == here)
+            {
+                back.swap_remove(found);
             }
             curve.push(next);
             here = next;
