@@ -19,11 +19,11 @@ const RAYS: (f64, u32) = (0.5, 360);
 
 /// Puts the last that a job speaks of into the size and onto the side that are asked for; travels that the
 /// job gives go with it.
-pub(crate) fn shaped(part: Part, file: &mut JobFile) -> Result<(Part, Option<Shaped>)> {
+pub(crate) fn shaped(part: &Part, file: &mut JobFile) -> Result<(Part, Option<Shaped>)> {
     let Some(of) = &file.last else {
-        return Ok((part, None));
+        return Ok((part.clone(), None));
     };
-    let shaped = shape(&part, &of.last, of.graded(), of.mirrored())?;
+    let shaped = shape(part, &of.last, of.graded(), of.mirrored())?;
     let motion = &mut file.job.motion;
     for travel in [&mut motion.from, &mut motion.to] {
         *travel = travel.map(|x| shaped.travel(x));

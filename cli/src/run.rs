@@ -215,6 +215,8 @@ pub(crate) async fn unless<T>(
 pub(crate) struct Prepared {
     pub part: Part,
     pub file: JobFile,
+    /// The job as it is said, for the report: what is made of its last is not made of that again.
+    pub job: serde_json::Value,
     /// What there is to warn of.
     pub warnings: Vec<String>,
     /// The last in it, if the job speaks of one.
@@ -226,10 +228,12 @@ pub(crate) fn read(file: &Path, overrides: &Overrides) -> Result<Prepared> {
     let mut file = job::read(file, overrides)?;
     let (part, warnings) = part::read_all(&file.files)?;
     let part = place(part, file.axis)?;
-    let (part, shaped) = lasts::shaped(part, &mut file)?;
+    let job = file.echo();
+    let (part, shaped) = lasts::shaped(&part, &mut file)?;
     Ok(Prepared {
         part,
         file,
+        job,
         warnings: warnings.iter().map(ToString::to_string).collect(),
         shaped,
     })
@@ -287,6 +291,7 @@ pub(crate) async fn carry_out(
     let Prepared {
         part,
         file,
+        job,
         warnings,
         shaped,
     } = prepared;
@@ -328,7 +333,7 @@ pub(crate) async fn carry_out(
     let (verification, clearances) = verified.unzip();
     let report = Report {
         version: VERSION.to_owned(),
-        job: file.echo(),
+        job,
         warnings,
         path: PathStatistics::of(&path, &record.counters),
         verification,

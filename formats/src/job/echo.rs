@@ -23,7 +23,7 @@ impl JobFile {
             }
         };
         let motion = self.job.motion;
-        json!({
+        let mut echo = json!({
             "part": { "files": files, "axis": axis },
             "discretization": discretization,
             "cutter": cutter_echo(&self.job.cutter),
@@ -43,8 +43,13 @@ impl JobFile {
             },
             "program": program_echo(&self.program),
             "machine": machine_echo(&self.machine),
-            "last": self.last.as_ref().map(last::echo),
-        })
+        });
+        for (section, said) in self.last.iter().flat_map(last::echo) {
+            if !said.is_null() {
+                echo[section] = said;
+            }
+        }
+        echo
     }
 }
 

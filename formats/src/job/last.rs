@@ -1,6 +1,7 @@
 //! The sections on a last: what it is in the part, how it is graded, where its landmarks are.
 
-use horma_core::{Choice, Frame, Grading, Hold, Landmark, Last, System, unit};
+use horma_core::{Choice, Frame, Grading, Hold, Landmark, Last, System};
+use serde_json::{Map, Value, json};
 
 use super::Source;
 use super::raw::{Given, RawGrading, RawJob};
@@ -72,7 +73,7 @@ impl Source<'_> {
     /// What a job says of its last; nothing if it does not speak of one.
     pub(super) fn last(&self, raw: &RawJob) -> Result<Option<LastOf>> {
         let section = &raw.last;
-        let (size, side) = (&section.size, &section.side_made);
+        let (size, side) = (&section.make.size, &section.make.side);
         let spoken = section.given || raw.grading.is_some() || !raw.measures.is_empty();
         if !spoken && size.is_none() && side.is_none() {
             return Ok(None);
@@ -171,34 +172,38 @@ impl Source<'_> {
     }
 }
 
-/// A last as values again, for the report.
-pub(super) fn echo(of: &LastOf) -> serde_json::Value {
-    let choices = of.last.choices.iter().map(|(landmark, choice)| {
-        let choice = match choice {
-            Choice::At(point) => serde_json::json!(point),
-            Choice::Share(share) => serde_json::json!(share),
-        };
-        (landmark.name().to_owned(), choice)
+/// The sections on a last as values again, for the report.
+pub(super) fn echo(of: &LastOf) -> [(&'static str, Value); 3] {
+    let name_of = super::echo::name_of::<bool>;
+    let mut make = Map::new();
+    if let Some(size) = of.size {
+        make.insert("size".to_owned(), json!(size));
+    }
+    make.insert("side".to_owned(), json!(of.side.name()));
+    let last = json!({
+        "bodies": of.last.bodies,
+        "toe": name_of(&TOES, &of.toe_at_greatest),
+        "up": of.up,
+        "side": of.files_side.name(),
+        "make": make,
     });
-    let choices: serde_json::Map<_, _> = choices.collect();
-    let grading = of.grading.map(|g| {
+    let grading = of.grading.map_or(Value::Null, |g| {
         let held = [g.hold.heel_height, g.hold.toe_spring, g.hold.toe_thickness];
         let held = HOLDS.iter().zip(held).filter(|(_, held)| *held);
-        serde_json::json!({
+        json!({
             "base": g.base,
             "system": super::echo::name_of(&SYSTEMS, &g.system),
-            "method": super::echo::name_of(&METHODS, &g.geometric),
+            "method": name_of(&METHODS, &g.geometric),
             "hold": held.map(|(name, _)| *name).collect::<Vec<_>>(),
         })
     });
-    let up = unit(of.up).unwrap_or(of.up);
-    serde_json::json!({
-        "bodies": of.last.bodies,
-        "toe": super::echo::name_of(&TOES, &of.toe_at_greatest),
-        "up": up,
-        "side": of.files_side.name(),
-        "grading": grading,
-        "measures": choices,
-        "made": { "size": of.size.or(of.grading.map(|g| g.base)), "side": of.side.name() },
-    })
+    let choices = of.last.choices.iter().map(|(landmark, choice)| {
+        let choice = match choice {
+            Choice::At(point) => json!(point),
+            Choice::Share(share) => json!(share),
+        };
+        (landmark.name().to_owned(), choice)
+    });
+    let measures = choices.collect::<Map<_, _>>().into();
+    [("last", last), ("grading", grading), ("measures", measures)]
 }

@@ -204,12 +204,16 @@ pub(super) struct RawLast {
     pub(super) toe: Option<Given<String>>,
     pub(super) up: Option<Given<[f64; 3]>>,
     pub(super) side: Option<Given<String>>,
-    /// The size to be made, which only a flag says.
-    #[serde(skip)]
+    #[serde(default)]
+    pub(super) make: RawMake,
+}
+
+/// What is to be made of a last.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawMake {
     pub(super) size: Option<Given<f64>>,
-    /// The side to be made, likewise.
-    #[serde(skip)]
-    pub(super) side_made: Option<Given<String>>,
+    pub(super) side: Option<Given<String>>,
 }
 
 /// A table that is there.
@@ -286,8 +290,8 @@ impl RawJob {
         put(&mut self.digitizing.delta_u, "delta_u", &by.delta_u);
         put(&mut self.digitizing.delta_v, "delta_v", &by.delta_v);
         put(&mut self.digitizing.fallback, "fallback", &by.fallback);
-        put(&mut self.last.size, "size", &by.size);
-        put(&mut self.last.side_made, "side", &by.side);
+        put(&mut self.last.make.size, "size", &by.size);
+        put(&mut self.last.make.side, "side", &by.side);
         put(&mut self.program.dialect, "dialect", &by.dialect);
         put(&mut self.program.split, "split", &by.split);
         put(&mut self.program.feed, "feed", &by.feed);

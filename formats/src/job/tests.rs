@@ -546,7 +546,8 @@ fn machines_that_cannot_be_are_refused() {
 fn the_echo_is_a_job_again() {
     let path = JOB.replacen("step = 2", "step = 2\npath_tolerance = 0.005", 1);
     let more = "travel = '-Z'\nangles = 'rezero'\napt = true\nsplit = { moves = 5000 }\n";
-    for text in [path.clone(), format!("{path}{more}{MACHINE}\n")] {
+    let full = format!("{path}{more}{MACHINE}\n{LAST}");
+    for text in [path.clone(), full] {
         let j = valid(&text);
         let mut echo = j.echo();
         // TOML has no null.
@@ -557,6 +558,58 @@ fn the_echo_is_a_job_again() {
         let text = toml::to_string(&echo).expect("TOML");
         let again = parse(&text, Path::new("job.toml"), &Overrides::default()).expect("valid");
         assert_eq!(again, j);
+    }
+}
+
+const LAST: &str = "
+[last]
+bodies = ['last']
+toe = '-x'
+up = [0, 1, 0.2]
+side = 'left'
+make = { size = 38.5, side = 'right' }
+[grading]
+base = 37
+system = 'uk'
+method = 'geometric'
+hold = ['toe_spring']
+[measures]
+instep = 0.4
+heel = [1, 2, 3]
+";
+
+#[test]
+fn a_last_is_graded_and_mirrored_as_it_says_or_as_flags_do() {
+    let text = format!("{JOB}{LAST}");
+    let last = valid(&text).last.expect("a last");
+    let (grading, size) = last.graded().expect("another size");
+    assert_eq!((grading.base, size, last.mirrored()), (37.0, 38.5, true));
+    let flags = Overrides {
+        size: Some(37.0),
+        side: Some("left".to_owned()),
+        ..Overrides::default()
+    };
+    let last = job(&text, &flags).expect("valid").last.expect("a last");
+    assert!(last.graded().is_none() && !last.mirrored());
+    assert!(valid(JOB).last.is_none(), "nobody spoke of one");
+    let error = job(JOB, &flags).expect_err("no base").to_string();
+    assert!(error.contains("no [grading]"), "{error}");
+    for (old, new, expected) in [
+        ("'-x'", "'up'", "known: +x, -x"),
+        ("[0, 1, 0.2]", "[1, 0, 0]", "not along the spindle"),
+        ("base = 37", "", "base = 37"),
+        ("'toe_spring'", "'width'", "toe_thickness"),
+        ("instep = 0.4", "ankle = 0.4", "known: heel"),
+        ("instep = 0.4", "instep = 1.4", "share of the last's length"),
+        ("heel = [1, 2, 3]", "heel = [1, 2]", "a point [x, y, z]"),
+    ] {
+        assert!(text.contains(old), "{old}");
+        let error = job(&text.replacen(old, new, 1), &Overrides::default());
+        let error = error.expect_err(new).to_string();
+        assert!(
+            error.contains(expected) && error.contains("jobs/job.toml:"),
+            "{error}"
+        );
     }
 }
 
