@@ -50,6 +50,10 @@ impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File(path) => write!(f, "\n --> {}", path.display()),
+            // No variable says what is made of a last; of several at once the flag is the plural.
+            Self::Flag(key @ ("size" | "side")) => {
+                write!(f, " (given as --{key} or --{key}s)")
+            }
             Self::Flag(key) => {
                 let (flag, variable) = (key.replace('_', "-"), key.to_uppercase());
                 write!(f, " (given as --{flag} or HORMA_{variable})")

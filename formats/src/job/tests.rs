@@ -593,7 +593,10 @@ fn a_last_is_graded_and_mirrored_as_it_says_or_as_flags_do() {
     assert!(last.graded().is_none() && !last.mirrored());
     assert!(valid(JOB).last.is_none(), "nobody spoke of one");
     let error = job(JOB, &flags).expect_err("no base").to_string();
-    assert!(error.contains("no [grading]"), "{error}");
+    assert!(
+        error.contains("no [grading]") && error.contains("--size or --sizes)"),
+        "{error}"
+    );
     for (old, new, expected) in [
         ("'-x'", "'up'", "known: +x, -x"),
         ("[0, 1, 0.2]", "[1, 0, 0]", "not along the spindle"),
