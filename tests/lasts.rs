@@ -145,6 +145,22 @@ fn bad_sizes_are_refused_with_advice() {
 }
 
 #[test]
+fn a_last_is_measured_and_drawn_with_its_landmarks() {
+    let dir = scratch();
+    let job = coarse(dir.path(), "[measures]\ninstep = 0.4\n");
+    let figure = dir.path().join("last.svg");
+    let told = succeed(&["measure", text(&job), "--figure", text(&figure), "--json"]);
+    let told: serde_json::Value = serde_json::from_str(&told).expect("JSON");
+    let instep = told["landmarks"]["instep"][0].as_f64().expect("a place");
+    let length = told["designed"]["length"].as_f64().expect("a number");
+    assert!((instep - (0.05 + 0.4 * length)).abs() < 0.01, "{instep}");
+    let drawn = fs::read_to_string(&figure).expect("a figure");
+    assert_eq!(drawn.matches("<circle").count(), 7);
+    assert_eq!(drawn.matches("<polygon").count(), 3);
+    assert!(drawn.contains(">ball inner</text>") && !drawn.contains("NaN"));
+}
+
+#[test]
 fn a_mirrored_mesh_has_a_mirrored_path() {
     let dir = scratch();
     let part = dir.path().join("part.stl");

@@ -7,7 +7,7 @@ use horma_core::{
     place, shape,
 };
 use horma_formats::job::{JobFile, Side};
-use horma_formats::lasts::Lasts;
+use horma_formats::lasts::{Lasts, figure};
 use horma_formats::{csv, part};
 
 use crate::args;
@@ -96,6 +96,7 @@ pub(crate) fn measure(args: &args::Measure) -> Result<()> {
                 None,
                 false,
             )?;
+            draw(args, &last, &shaped)?;
             Lasts::of(&shaped, &last.frame, None)
         }
     };
@@ -124,9 +125,19 @@ fn of_job(args: &args::Measure, job: &Path) -> Result<Lasts> {
         ),
     };
     let threads = args.threads.map_or_else(system::cores, usize::from);
+    if let (Some(of), Some(shaped)) = (&file.last, &shaped) {
+        draw(args, &of.last, shaped)?;
+    }
     let found = match &shaped {
         Some(shaped) => figures(&file, shaped, positions.as_deref(), threads)?,
         None => None,
     };
     found.ok_or(Error::MeasureNeedsJob)
+}
+
+fn draw(args: &args::Measure, last: &Last, shaped: &Shaped) -> Result<()> {
+    if let Some(file) = &args.figure {
+        figure::save(file, &last.sections(shaped)?)?;
+    }
+    Ok(())
 }

@@ -24,7 +24,7 @@ use crate::vector::{Interval, Point, cross, dot, unit};
 
 pub use grade::{Grading, Hold, Scale, System};
 pub use landmarks::{Choice, Landmark, Landmarks};
-pub use measures::Measures;
+pub use measures::{Measures, Sections};
 use skin::Skin;
 
 /// What is the last in a part, and how it lies there.
@@ -246,6 +246,14 @@ impl Last {
         let along = designed.along();
         let measures = measures::measure(&moved, &self.frame, &landmarks, along)?;
         Ok((measures, known))
+    }
+
+    /// The sections in which the last of `shaped` is measured, with its landmarks.
+    ///
+    /// # Errors
+    /// Those of [`shape`].
+    pub fn sections(&self, shaped: &Shaped) -> Result<Sections> {
+        measures::sections(&self.skin(&shaped.part)?, &self.frame, &shaped.landmarks)
     }
 
     /// Extent in travel of an extent along the last.

@@ -72,7 +72,7 @@ pub use grid::SurfaceGrid;
 pub use job::{Contact, Culling, Discretization, Distribution, Job, Local, Method};
 pub use job::{Sharing, Window};
 pub use last::{Choice, Frame, Grading, Hold, Landmark, Landmarks, Last, Measures, Scale, Shaped};
-pub use last::{System, shape};
+pub use last::{Sections, System, shape};
 pub use motion::{Index, Motion, MotionKind, Trajectory};
 pub use part::{Body, Mesh, Part, Shape};
 pub use path::{Inserted, SubTrajectory, ToolPath, Touch, Waypoint, stitch};

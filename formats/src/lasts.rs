@@ -1,5 +1,7 @@
 //! What is told of a last: its measures as designed and as machined, and between which landmarks.
 
+pub mod figure;
+
 use std::collections::BTreeMap;
 
 use horma_core::{Frame, Landmark, Measures, Point, Scale, Shaped};

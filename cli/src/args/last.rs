@@ -62,6 +62,9 @@ pub(crate) struct Measure {
     pub path: Option<PathBuf>,
     #[command(flatten)]
     pub made: Made,
+    /// Draw the sections in which it is measured, with the landmarks, into this SVG file
+    #[arg(long, value_name = "FILE")]
+    pub figure: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

@@ -7,7 +7,7 @@ use super::curve::Loop;
 use super::landmarks::{Landmark, Landmarks, begin_at_lowest};
 use super::skin::{Plane, Skin, hull, stretch, tape};
 use crate::error::{Error, Result};
-use crate::vector::{Interval, Point, add_scaled, sub};
+use crate::vector::{Interval, Point, add_scaled, dot, sub, unit};
 
 /// What is measured on a last, mm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -74,6 +74,36 @@ impl Measures {
     }
 }
 
+/// Sections of a last that show its measures, mm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sections {
+    /// In the median plane, along and up.
+    pub median: Vec<[f64; 2]>,
+    /// Of the ball girth, across and up.
+    pub ball: Vec<[f64; 2]>,
+    /// Of the cone heel line, across and along its plane.
+    pub cone_heel: Vec<[f64; 2]>,
+    /// The places of [`Landmark::ALL`]: along, across, up.
+    pub landmarks: [Point; 7],
+}
+
+/// The sections in which measures are taken.
+pub(super) fn sections(skin: &Skin, frame: &Frame, landmarks: &Landmarks) -> Result<Sections> {
+    let curve = median(skin, frame)?;
+    let cut = |plane: Option<Plane>| plane.map_or_else(Vec::new, |p| skin.section(&p));
+    let ball = cut(ball_plane(landmarks));
+    // From the instep down to the heel.
+    let cone_heel = cut(across(landmarks));
+    let [instep, heel] = [Landmark::Instep, Landmark::Heel].map(|l| landmarks.get(l));
+    let down = unit(sub(heel, instep)).unwrap_or_default();
+    Ok(Sections {
+        median: curve.between(0.0, curve.length() * (1.0 - 1e-9)),
+        ball: ball.iter().map(|p| [p[1], p[2]]).collect(),
+        cone_heel: cone_heel.iter().map(|&p| [p[1], -dot(p, down)]).collect(),
+        landmarks: landmarks.0,
+    })
+}
+
 /// Takes all measures. The toe is as thick as it is where that is measured on a last that extends over `along`.
 pub(super) fn measure(
     skin: &Skin,
@@ -109,9 +139,14 @@ pub(super) fn measure(
 
 /// A tape around the ball.
 pub(super) fn ball_girth(skin: &Skin, landmarks: &Landmarks) -> Result<f64> {
-    let [left, right, vamp] =
+    girth(skin, ball_plane(landmarks), "ball")
+}
+
+/// The plane of the ball girth.
+fn ball_plane(landmarks: &Landmarks) -> Option<Plane> {
+    let [inner, outer, vamp] =
         [Landmark::BallInner, Landmark::BallOuter, Landmark::Vamp].map(|l| landmarks.get(l));
-    girth(skin, Plane::through(left, right, vamp), "ball")
+    Plane::through(inner, outer, vamp)
 }
 
 /// The plane of the cone heel line.
