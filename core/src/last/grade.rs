@@ -5,7 +5,7 @@
 //! `h′ = k(s)·h + c(s)`. k goes from γ at the tread to 1 at the toe where the toe's thickness is held; c is
 //! none at the tread, and as much at heel and toe as takes these to the heights that are held. Such a map is
 //! applied to poles and vertices; between poles of a surface it is followed to within what a surface with
-//! these poles can, some µm on a last.
+//! these poles can, some hundredths of a millimetre on the sample.
 
 use serde::{Deserialize, Serialize};
 
