@@ -93,7 +93,7 @@ Writes machined.ply (mm, part coordinates, a deviation and a colour at each corn
     Machined(Machined),
     /// Measure a shoe last: bottom length, centre line, ball girth, cone heel line, and what else there is
     ///
-    /// Landmarks are found on the last, or taken from [measures] in the job. Given a path as well, the last is
+    /// Landmarks are found on the last, or taken from the job. Given a path as well, the last is
     /// measured as that path leaves it, too.
     #[command(after_help = "\
 Examples:

@@ -253,7 +253,6 @@ fn perform(
     let display = Display::new(asked.how.quiet);
     let performed = runtime.block_on(async {
         let overrides = asked.how.overrides(workers);
-        output::prepare_dir(asked.output)?;
         carry_out(asked, &overrides, threads, &display, &stop, compute).await
     });
     // Before anything else is said, and also if nothing good came of it.
@@ -275,7 +274,8 @@ pub(crate) fn stop_when_interrupted(runtime: &Runtime, stop: &CancellationToken)
     });
 }
 
-/// Reads a job, has it computed, and writes its results into a directory that is there.
+/// Reads a job, has it computed, and writes its results; what is wrong with the job is said before
+/// there is a directory for them.
 pub(crate) async fn carry_out(
     asked: &Asked<'_>,
     overrides: &Overrides,
@@ -296,6 +296,7 @@ pub(crate) async fn carry_out(
         shaped,
     } = prepared;
     let read = phase("read", begin);
+    output::prepare_dir(asked.output)?;
     for warning in &warnings {
         display.note(&format!("warning: {warning}"));
     }

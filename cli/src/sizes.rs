@@ -154,7 +154,6 @@ async fn one(
     stop: &CancellationToken,
 ) -> Result<Size> {
     let output = staging.file(&wanted.name);
-    output::prepare_dir(&output)?;
     let asked = Asked {
         file: &args.job.file,
         how: &args.job.how,

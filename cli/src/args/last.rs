@@ -13,7 +13,7 @@ const MOST: usize = 200;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "The last in other sizes, and for the other foot")]
 pub(crate) struct Sizes {
-    /// Sizes to make, graded as [grading] in the job says: 36-42, 36-42/0.5 for half sizes, 36,37.5 or
+    /// Sizes to make, graded as the job says: 36-42, 36-42/0.5 for half sizes, 36,37.5 or
     /// all of these; each into a directory such as 37-left of DIR, with one report.json and one
     /// report.html for all
     #[arg(long, value_name = "LIST", value_parser = sizes)]
