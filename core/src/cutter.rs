@@ -5,6 +5,7 @@
 //! the 2001 paper is the torus. This module knows shapes only; heights are in `contact`.
 
 use crate::error::{Error, Result, bounded};
+use crate::vector::Interval;
 
 /// A wheel. Lengths in mm; construct with the functions, which check the dimensions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,6 +108,30 @@ impl Cutter {
         })
     }
 
+    /// A wheel that keeps this one `by` away from whatever it does not enter itself, mm. Of a torus that is
+    /// exactly what is no further than that from it; of a cone, the least cone that holds it.
+    ///
+    /// # Errors
+    /// [`Error::OutOfBounds`] if it is larger than wheels may be.
+    pub fn grown(&self, by: f64) -> Result<Self> {
+        match *self {
+            Self::Torus {
+                major_radius,
+                minor_radius,
+            } => Self::torus(major_radius, minor_radius + by),
+            Self::Cone {
+                radius,
+                width,
+                half_angle,
+                slope,
+            } => {
+                // The side moves by that much along its normal, and both ends along the axis.
+                let radius = radius + by * (1.0 + slope * slope).sqrt();
+                Self::cone(radius, width + 2.0 * by, half_angle)
+            }
+        }
+    }
+
     /// w: half the width along the spindle, mm.
     pub fn half_width(&self) -> f64 {
         match *self {
@@ -129,6 +154,20 @@ impl Cutter {
                 ..
             } => radius + slope.abs() * width / 2.0,
         }
+    }
+
+    /// The largest radius at axial distances in `over`, mm, or `None` if they are all beyond the width.
+    pub fn largest(&self, over: Interval) -> Option<f64> {
+        let w = self.half_width();
+        let (low, high) = (over.low.max(-w), over.high.min(w));
+        if low > high {
+            return None;
+        }
+        self.profile(match *self {
+            Self::Torus { .. } => 0.0_f64.clamp(low, high),
+            Self::Cone { slope, .. } if slope > 0.0 => high,
+            Self::Cone { .. } => low,
+        })
     }
 
     /// `m(d)`, the radius at axial distance `d` from the centre, or `None` beyond the width.
@@ -167,6 +206,35 @@ mod tests {
             Cutter::cone(10.0, 30.0, 45.0),
             Err(Error::ConeTooSteep { .. })
         ));
+    }
+
+    #[test]
+    fn a_grown_wheel_holds_all_that_is_so_near() {
+        for cutter in [
+            Cutter::torus(40.0, 8.0),
+            Cutter::ball(6.0),
+            Cutter::cylinder(15.0, 6.0),
+            Cutter::cone(15.0, 20.0, 50.0),
+            Cutter::cone(10.0, 20.0, -45.0),
+        ] {
+            let (cutter, by) = (cutter.expect("valid"), 1.5);
+            let grown = cutter.grown(by).expect("valid");
+            let w = cutter.half_width();
+            let (mut nearest, steps) = (f64::INFINITY, 400);
+            for i in 0..=steps {
+                let d = w * (f64::from(2 * i) / f64::from(steps) - 1.0);
+                let m = cutter.profile(d).expect("inside");
+                // All around a point of the rim.
+                for j in 0..360 {
+                    let (sin, cos) = f64::from(j).to_radians().sin_cos();
+                    let (d, m) = (d + 0.999_999 * by * sin, m + 0.999_999 * by * cos);
+                    let over = grown.profile(d).expect("inside") - m;
+                    assert!(over > -1e-9, "{cutter:?} at {d}: {over}");
+                    nearest = nearest.min(over);
+                }
+            }
+            assert!(nearest < 1e-3, "{cutter:?}: {nearest}");
+        }
     }
 
     #[test]

@@ -283,6 +283,16 @@ pub enum Error {
         /// Most that there is memory for.
         limit: u64,
     },
+    /// Roughing in more layers than are made.
+    #[error(
+        "roughing takes {layers} layers, more than the {limit} that are made over so many positions; ask for a larger depth_of_cut, or check the stock"
+    )]
+    TooManyLayers {
+        /// Layers that it would take.
+        layers: f64,
+        /// Most that are made.
+        limit: u64,
+    },
     /// Heights between positions where only a chain through all positions gives them.
     #[error(
         "path_tolerance needs heights between positions, which the local search without its fallback does not have; leave the fallback on, or choose the exact search"
@@ -307,6 +317,7 @@ impl Error {
                 | Self::ToleranceNotReached { .. }
                 | Self::TooManyPositions { .. }
                 | Self::TooManyInserted { .. }
+                | Self::TooManyLayers { .. }
                 | Self::TooManyRays { .. }
                 | Self::TooManySamples { .. }
                 | Self::GridTooLarge { .. }

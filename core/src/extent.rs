@@ -223,6 +223,7 @@ pub(crate) mod tests {
                 from: None,
                 to: None,
                 path_tolerance,
+                lead: [0.0; 2],
             },
             contact: Contact::Point,
             method: Method::Exact,

@@ -83,6 +83,18 @@ pub struct Peak {
     pub jerk: f64,
 }
 
+impl Peak {
+    /// The greater of each.
+    #[must_use]
+    pub fn max(self, other: Self) -> Self {
+        Self {
+            velocity: self.velocity.max(other.velocity),
+            acceleration: self.acceleration.max(other.acceleration),
+            jerk: self.jerk.max(other.jerk),
+        }
+    }
+}
+
 /// The same path at one speed of the spindle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Steady {

@@ -50,8 +50,13 @@ mod digitize;
 
 mod path;
 
+mod keep_out;
+mod solid;
+
 mod course;
 mod feed;
+
+mod layers;
 
 mod verify;
 
@@ -71,8 +76,10 @@ pub use feed::{AxisLimits, Bound, Limits, Peak, Steady, Timing, peaks, steady, t
 pub use grid::SurfaceGrid;
 pub use job::{Contact, Culling, Discretization, Distribution, Job, Local, Method};
 pub use job::{Sharing, Window};
+pub use keep_out::{KeepOut, Raised, keep_out};
 pub use last::{Choice, Frame, Grading, Hold, Landmark, Landmarks, Last, Measures, Scale, Shaped};
 pub use last::{Sections, System, shape};
+pub use layers::{Layer, deepest_cut, layers};
 pub use motion::{Index, Motion, MotionKind, Trajectory};
 pub use part::{Body, Mesh, Part, Shape};
 pub use path::{Inserted, SubTrajectory, ToolPath, Touch, Waypoint, stitch};
@@ -84,6 +91,7 @@ pub use record::{SecondAttempt, Share, Traffic, WorkerRecord};
 pub use row::{Outline, Row, RowKind};
 pub use runs::Run;
 pub use simd::Simd;
+pub use solid::{Section, Solid};
 pub use surface::{Direction, MAX_DEGREE, Surface};
 pub use tolerance::MAX_COORDINATE;
 pub use vector::{Interval, Point, cross, dot, length, sub, unit};

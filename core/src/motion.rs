@@ -35,6 +35,9 @@ pub struct Motion {
     /// How far the straight move from one position to the next may stray from the exact heights,
     /// mm along the attack axis, before positions are inserted between them; by default nobody looks.
     pub path_tolerance: Option<f64>,
+    /// Travel before the first and after the last, mm, for the cutter to come in from beside the part and
+    /// to leave it.
+    pub lead: [f64; 2],
 }
 
 /// The index of a position: whole for those of the trajectory, and so many [`Index::PARTS`]ths of the
@@ -140,6 +143,10 @@ impl Motion {
                 bounded(name, value, ok, "within a kilometre of the origin")?;
             }
         }
+        for (name, value) in ["lead_in", "lead_out"].into_iter().zip(self.lead) {
+            let ok = (0.0..=MAX_COORDINATE).contains(&value);
+            bounded(name, value, ok, "from 0 to a kilometre")?;
+        }
         if let Some(tolerance) = self.path_tolerance {
             bounded(
                 "path_tolerance",
@@ -168,6 +175,7 @@ impl Motion {
         if from > to {
             return Err(Error::EmptyTravel { from, to });
         }
+        let (from, to) = (from - self.lead[0], to + self.lead[1]);
         let mut trajectory = Trajectory {
             kind: self.kind,
             from,
@@ -273,6 +281,7 @@ mod tests {
             from: Some(0.0),
             to: Some(4.0),
             path_tolerance: None,
+            lead: [0.0; 2],
         }
     }
 
@@ -280,6 +289,32 @@ mod tests {
         low: 0.0,
         high: 10.0,
     };
+
+    #[test]
+    fn leads_lie_beside_the_travel() {
+        let lead = [1.0, 2.0];
+        let given = Motion {
+            lead,
+            ..motion(MotionKind::Helix)
+        };
+        let t = given.over(PART, 1.0).expect("valid");
+        assert_eq!((t.from, t.travel(t.positions - 1)), (-1.0, 6.0));
+        let whole = Motion {
+            from: None,
+            to: None,
+            ..given
+        };
+        let t = whole.over(PART, 1.0).expect("valid");
+        assert!((t.from + 2.0).abs() < 1e-5, "{t:?}");
+        let backwards = Motion {
+            from: Some(5.0),
+            ..given
+        };
+        assert!(backwards.over(PART, 1.0).is_err());
+        for lead in [[-1.0, 0.0], [0.0, f64::NAN]] {
+            assert!(Motion { lead, ..given }.validate().is_err());
+        }
+    }
 
     #[test]
     fn a_helix_advances_with_the_angle_and_includes_its_end() {

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::motion::{Index, Trajectory};
-use crate::vector::Point;
+use crate::vector::{Interval, Point};
 use crate::verify::Position;
 
 /// Where the cutter touches the part at one position.
@@ -72,6 +72,40 @@ impl ToolPath {
                 touch,
             })
         })
+    }
+
+    /// The same with, of each position, the travel of all that lies on the moves to it and from it, and
+    /// the cosine and sine of its angle.
+    pub(crate) fn along(&self) -> impl Iterator<Item = (Waypoint, Interval, (f64, f64))> + '_ {
+        let before = std::iter::once(None).chain(self.waypoints().map(Some));
+        let after = self.waypoints().skip(1).map(Some).chain([None]);
+        let all = self.waypoints().zip(before).zip(after);
+        all.map(|((waypoint, before), after)| {
+            let (index, x) = (waypoint.index, waypoint.x);
+            let travel = Interval {
+                low: before.map_or(x, |w| w.x),
+                high: after.map_or(x, |w| w.x),
+            };
+            let direction = self.trajectory.direction_at(index.floor(), index.share());
+            (waypoint, travel, direction)
+        })
+    }
+
+    /// The same positions with other touches, one for each in the order of [`ToolPath::waypoints`].
+    pub(crate) fn with(&self, all: Vec<Option<Touch>>) -> Self {
+        let mut path = Self {
+            trajectory: self.trajectory,
+            touches: Vec::with_capacity(self.touches.len()),
+            between: Vec::with_capacity(self.between.len()),
+        };
+        for (waypoint, touch) in self.waypoints().zip(all) {
+            let index = waypoint.index;
+            match index.parts() {
+                0 => path.touches.push(touch),
+                _ => path.between.push(Inserted { index, touch }),
+            }
+        }
+        path
     }
 
     /// The same path by the numbers a machine is given, for [`crate::verify()`].

@@ -261,6 +261,7 @@ fn designed(rows: &[Row], rays: &Rays, simd: Simd) -> Result<Vec<Option<f64>>> {
             from: None,
             to: None,
             path_tolerance: None,
+            lead: [0.0; 2],
         },
         contact: Contact::Facet,
         method: Method::Exact,

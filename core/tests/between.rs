@@ -50,6 +50,7 @@ fn job(kind: MotionKind, path_tolerance: Option<f64>) -> Job {
             from: Some(10.0),
             to: Some(60.0),
             path_tolerance,
+            lead: [0.0; 2],
         },
         contact: Contact::Facet,
         method: Method::Exact,

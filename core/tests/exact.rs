@@ -123,6 +123,7 @@ fn a_lid_that_bends_outward_is_not_skipped_where_the_cutter_is_level() {
                     from: None,
                     to: None,
                     path_tolerance: None,
+                    lead: [0.0; 2],
                 },
                 contact: Contact::Facet,
                 method: Method::Exact,

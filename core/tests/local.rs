@@ -54,6 +54,7 @@ fn plan(method: Method) -> Plan {
             from: Some(0.0),
             to: Some(100.0),
             path_tolerance: None,
+            lead: [0.0; 2],
         },
         contact: Contact::Point,
         method,

@@ -322,6 +322,7 @@ impl Source<'_> {
             from: motion.from.as_ref().map(|g| g.value),
             to: motion.to.as_ref().map(|g| g.value),
             path_tolerance: motion.path_tolerance.as_ref().map(|g| g.value),
+            lead: [0.0; 2],
         })
     }
 

@@ -80,6 +80,7 @@ mod tests {
             from: Some(0.0),
             to: Some(10.0),
             path_tolerance: None,
+            lead: [0.0; 2],
         };
         let extent = Interval {
             low: 0.0,

@@ -118,6 +118,7 @@ static PLANNED: LazyLock<(Handout, Extent)> = LazyLock::new(|| {
             from: Some(0.0),
             to: Some(4.0),
             path_tolerance: Some(0.1),
+            lead: [0.0; 2],
         },
         contact: Contact::Facet,
         method: Method::Exact,

@@ -49,6 +49,8 @@ pub fn job_to_wire(job: &Job) -> wire::Job {
             from: job.motion.from,
             to: job.motion.to,
             path_tolerance: job.motion.path_tolerance,
+            lead_in: job.motion.lead[0],
+            lead_out: job.motion.lead[1],
         }),
         contact: match job.contact {
             Contact::Point => wire::Contact::Point,
@@ -89,6 +91,7 @@ pub fn job_from_wire(job: &wire::Job) -> Result<Job> {
         from: motion.from,
         to: motion.to,
         path_tolerance: motion.path_tolerance,
+        lead: [motion.lead_in, motion.lead_out],
     };
     let job = Job {
         discretization,
@@ -211,6 +214,7 @@ pub fn trajectory_from_wire(t: Option<&wire::Trajectory>) -> Result<Trajectory> 
         from: Some(t.from),
         to: None,
         path_tolerance: None,
+        lead: [0.0; 2],
     };
     motion.validate()?;
     Ok(Trajectory {
@@ -457,6 +461,7 @@ mod tests {
                 from: None,
                 to: Some(12.5),
                 path_tolerance: None,
+                lead: [0.0; 2],
             },
             contact: Contact::Facet,
             method: Method::Brute,
@@ -473,6 +478,7 @@ mod tests {
             let mut job = job(cutter.expect("valid"));
             assert_eq!(job_from_wire(&job_to_wire(&job)), Ok(job));
             job.motion.path_tolerance = Some(0.005);
+            job.motion.lead = [4.0, 2.5];
             job.contact = Contact::Point;
             job.method = Method::Local(Local {
                 window: Some(Window {

@@ -621,5 +621,6 @@ fn motion(dice: &mut Dice, part: &Part, cutter: &Cutter) -> Motion {
         from,
         to,
         path_tolerance: None,
+        lead: [0.0; 2],
     }
 }

@@ -51,6 +51,8 @@ pub fn job() -> wire::Job {
             from: Some(-1.0),
             to: Some(1.0),
             path_tolerance: Some(0.005),
+            lead_in: 0.0,
+            lead_out: 0.0,
         }),
         contact: wire::Contact::Facet.into(),
         method: wire::Method::Exact.into(),
