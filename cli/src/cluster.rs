@@ -38,20 +38,20 @@ pub(crate) struct Workers<'a> {
     pub otlp: Option<&'a str>,
 }
 
-/// Digitizes a part on worker processes. Dropping the future stops them.
+/// Digitizes a part on worker processes, for one job after the other. Dropping the future stops them.
 pub(crate) async fn run(
     part: Part,
-    job: Job,
+    jobs: Vec<Job>,
     sharing: Sharing,
     workers: Workers<'_>,
     progress: Progress,
-) -> Result<Outcome> {
+) -> Result<Vec<Outcome>> {
     let local = start(&workers).await?;
-    let outcome = local.master.run(part, job, sharing, 1, progress).await;
+    let outcomes = local.run_all(part, jobs, sharing, &progress).await;
     if workers.otlp.is_some() {
         local.end().await;
     }
-    Ok(outcome?)
+    outcomes
 }
 
 /// A master in this process and its worker processes, until it is dropped.
@@ -65,6 +65,22 @@ pub(crate) struct Local {
 }
 
 impl Local {
+    /// Digitizes a part for one job after the other.
+    pub async fn run_all(
+        &self,
+        part: Part,
+        jobs: Vec<Job>,
+        sharing: Sharing,
+        progress: &Progress,
+    ) -> Result<Vec<Outcome>> {
+        let mut outcomes = Vec::with_capacity(jobs.len());
+        for job in jobs {
+            let (part, progress) = (part.clone(), progress.clone());
+            outcomes.push(self.master.run(part, job, sharing, 1, progress).await?);
+        }
+        Ok(outcomes)
+    }
+
     /// Has the workers come to an end in good order: what they hold is not the master's alone when they
     /// have spans to send.
     async fn end(mut self) {

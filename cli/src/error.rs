@@ -88,6 +88,23 @@ pub(crate) enum Error {
         x: f64,
         angle: f64,
     },
+    #[error("the roughing leaves {left:.4} mm instead of {allowance} at [{:.3}, {:.3}, {:.3}] of the part; digitize facets (contact = \"facet\") to a finer tolerance, or skip the verification with --no-verify", point[0], point[1], point[2])]
+    RoughTooDeep {
+        left: f64,
+        allowance: f64,
+        point: [f64; 3],
+    },
+    #[error("a straight move of the roughing gouges the part by {depth:.4} mm at [{:.3}, {:.3}, {:.3}] of the part (travel {x:.3}, angle {angle:.2}°); give [roughing] more points_per_revolution, a path_tolerance or a larger allowance, or skip the verification with --no-verify", point[0], point[1], point[2])]
+    RoughGouge {
+        depth: f64,
+        point: [f64; 3],
+        x: f64,
+        angle: f64,
+    },
+    #[error(
+        "a job with [roughing] is two jobs for a master, and {command} knows of one; use `horma submit JOB -o DIR`, which waits for both"
+    )]
+    OneJob { command: &'static str },
     #[error(
         "without its fallback, or without delta_u and delta_v, the local search goes over the whole path in one process; use `horma run` without workers"
     )]
@@ -132,6 +149,8 @@ impl Error {
             | Self::Differs { .. }
             | Self::Gouge { .. }
             | Self::MotionGouge { .. }
+            | Self::RoughTooDeep { .. }
+            | Self::RoughGouge { .. }
             | Self::NoBrowser { .. } => 3,
             Self::Master(horma_master::Error::Plan(e)) => of_core(e),
             Self::Master(
@@ -149,6 +168,7 @@ impl Error {
             | Self::Refused { .. }
             | Self::NoSuchJob { .. }
             | Self::OneProcess
+            | Self::OneJob { .. }
             | Self::NothingToView { .. }
             | Self::MeasureNeedsJob
             | Self::Traces(_)

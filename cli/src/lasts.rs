@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use horma_core::{
-    Discretization, Frame, Last, Machined, Outline, Part, Position, Rays, Shaped, Simd, discretize,
-    place, shape,
+    Discretization, Frame, Interval, Last, Machined, Outline, Part, Position, Rays, Shaped, Simd,
+    discretize, place, shape,
 };
 use horma_formats::job::{JobFile, Side};
 use horma_formats::lasts::{Lasts, figure};
@@ -24,9 +24,18 @@ pub(crate) fn shaped(part: &Part, file: &mut JobFile) -> Result<(Part, Option<Sh
         return Ok((part.clone(), None));
     };
     let shaped = shape(part, &of.last, of.graded(), of.mirrored())?;
-    let motion = &mut file.job.motion;
-    for travel in [&mut motion.from, &mut motion.to] {
-        *travel = travel.map(|x| shaped.travel(x));
+    let roughing = file.roughing.as_mut().map(|r| &mut r.motion);
+    for motion in [&mut file.job.motion].into_iter().chain(roughing) {
+        for travel in [&mut motion.from, &mut motion.to] {
+            *travel = travel.map(|x| shaped.travel(x));
+        }
+    }
+    let kept = file.keep_outs.iter_mut().map(|k| &mut k.x);
+    for x in kept.chain(file.stock.as_mut().map(|s| &mut s.x)) {
+        *x = Interval {
+            low: shaped.travel(x.low),
+            high: shaped.travel(x.high),
+        };
     }
     Ok((shaped.part.clone(), Some(shaped)))
 }

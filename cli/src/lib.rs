@@ -5,6 +5,7 @@
 mod args;
 mod error;
 
+mod passes;
 mod program;
 mod run;
 

@@ -7,12 +7,12 @@ use std::thread;
 use std::time::Instant;
 
 use horma_core::{
-    Clearances, Counters, Method, Part, Phase, Position, Shaped, Simd, ToolPath, Verification,
+    Clearances, Counters, Job, Method, Part, Phase, Record, Shaped, Simd, ToolPath, Verification,
     place,
 };
 use horma_formats::job::{self, JobFile, Overrides};
 use horma_formats::output::Staging;
-use horma_formats::report::{self, PathStatistics, Report};
+use horma_formats::report::{self, Left, PathStatistics, Report, RoughStatistics};
 use horma_formats::{csv, output, part, preview, view};
 use horma_master::{Outcome, Progress};
 use horma_proto::{VERSION, trace};
@@ -24,9 +24,10 @@ use crate::args::{self, How};
 use crate::client::Remote;
 use crate::cluster::Workers;
 use crate::error::{Error, Result};
+use crate::passes::Passes;
 use crate::progress::Display;
 use crate::serve::{NOTICE, runtime};
-use crate::{cluster, here, lasts, program, say, submit, system, verify};
+use crate::{cluster, here, lasts, passes, program, say, submit, system, verify};
 
 /// A job and where its results go.
 pub(crate) struct Asked<'a> {
@@ -41,15 +42,17 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
         &asked(&args.job, &args.output),
         args.workers,
         args.threads.map(usize::from),
-        async |part, file, display, stop| {
+        async |part, file, targets, display, stop| {
             let threads = args.threads.map(usize::from);
             let simd = args.simd.unwrap_or_else(Simd::best);
-            let (workers, job) = (file.cluster.workers, file.job);
-            let sharing = file.cluster.sharing;
+            let (workers, sharing) = (file.cluster.workers, file.cluster.sharing);
             if workers == 0 {
                 let threads = threads.unwrap_or_else(system::cores);
                 let stopped = stop.clone();
-                let run = move || here::run(&part, job, threads, simd, &display, &stopped);
+                let run = move || {
+                    let run = |job| here::run(&part, job, threads, simd, &display, &stopped);
+                    targets.into_iter().map(run).collect()
+                };
                 let span = info_span!("digitize");
                 let run = tokio::task::spawn_blocking(move || span.in_scope(run));
                 return unless(stop, async { run.await.unwrap_or(Err(Error::Interrupted)) }).await;
@@ -61,7 +64,7 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
                 simd,
                 otlp: args.traces.otlp.as_ref().map(|to| &*to.url),
             };
-            let run = cluster::run(part, job, sharing, workers, progress);
+            let run = cluster::run(part, targets, sharing, workers, progress);
             // Dropping it stops the workers.
             unless(stop, run).await
         },
@@ -74,31 +77,38 @@ pub(crate) fn submit(args: &args::Submit) -> Result<()> {
     let Some(output) = &args.output else {
         return detach(&args.job, &remote);
     };
-    let mut sent = None;
+    let mut sent = Vec::new();
     perform(
         &asked(&args.job, output),
         None,
         None,
-        async |part, file, display, stop| {
+        async |part, file, targets, display, stop| {
             display.tell("send", 0, 0);
             let name = name_of(&args.job.file);
-            let sharing = file.cluster.sharing;
             check_divisible(file)?;
-            let sending = submit::send(&remote, &part, file.job, sharing, &name);
-            let sending = trace::within(info_span!("send", otel.kind = "client"), sending);
-            let id = *sent.insert(unless(stop.clone(), sending).await?);
-            let progress = progress(display);
-            let fetching = submit::fetch(&remote, id, true, &progress);
-            let fetching = trace::within(info_span!("wait and fetch"), fetching);
-            let fetched = unless(stop, fetching).await;
-            if let Err(Error::Interrupted) = fetched {
-                // If that does not reach the master, the job is merely done in vain.
-                let _ = submit::cancel(&remote, id).await;
+            for job in targets {
+                let sending = submit::send(&remote, &part, job, file.cluster.sharing, &name);
+                let sending = trace::within(info_span!("send", otel.kind = "client"), sending);
+                sent.push(unless(stop.clone(), sending).await?);
             }
-            fetched
+            let progress = progress(display);
+            let mut outcomes = Vec::new();
+            for &id in &sent {
+                let fetching = submit::fetch(&remote, id, true, &progress);
+                let fetching = trace::within(info_span!("wait and fetch"), fetching);
+                let fetched = unless(stop.clone(), fetching).await;
+                if let Err(Error::Interrupted) = fetched {
+                    for &id in &sent {
+                        // If that does not reach the master, the job is merely done in vain.
+                        let _ = submit::cancel(&remote, id).await;
+                    }
+                }
+                outcomes.push(fetched?);
+            }
+            Ok(outcomes)
         },
     )?;
-    leave(&remote, sent)
+    leave(&remote, &sent)
 }
 
 fn asked<'a>(job: &'a args::Job, output: &'a Path) -> Asked<'a> {
@@ -110,6 +120,7 @@ fn asked<'a>(job: &'a args::Job, output: &'a Path) -> Asked<'a> {
 fn detach(args: &args::Job, remote: &Remote) -> Result<()> {
     let Prepared { part, file, .. } = read(&args.file, &args.how.overrides(None))?;
     check_divisible(&file)?;
+    check_single(&file, "submit --detach")?;
     let (name, sharing) = (name_of(&args.file), file.cluster.sharing);
     let sending = submit::send(remote, &part, file.job, sharing, &name);
     let id = runtime()?.block_on(sending)?;
@@ -123,14 +134,16 @@ pub(crate) fn fetch(args: args::Fetch) -> Result<()> {
     let (id, wait, output) = (args.id, args.wait, args.output);
     match args.file {
         Some(file) => {
+            check_single(&job::read(&file, &args.how.overrides(None))?, "fetch")?;
             let asked = Asked {
                 file: &file,
                 how: &args.how,
                 output: &output,
             };
-            perform(&asked, None, None, async |_, _, display, stop| {
+            perform(&asked, None, None, async |_, _, _, display, stop| {
                 let progress = progress(display);
-                unless(stop, submit::fetch(&remote, id, wait, &progress)).await
+                let fetched = unless(stop, submit::fetch(&remote, id, wait, &progress)).await;
+                Ok(vec![fetched?])
             })?;
         }
         None => fetch_alone(&remote, id, wait, &output, args.how.quiet)?,
@@ -138,8 +151,11 @@ pub(crate) fn fetch(args: args::Fetch) -> Result<()> {
     if args.keep {
         return Ok(());
     }
-    leave(&remote, Some(id))
+    leave(&remote, &[id])
 }
+
+/// What is said of a path whose job is not known here.
+const UNKNOWN: &str = "this path was fetched without its job file: it keeps out of nothing that the job's [[keep_out]] may name";
 
 /// Fetches a path about whose part and machine nothing is known here.
 fn fetch_alone(remote: &Remote, id: u64, wait: bool, output: &Path, quiet: bool) -> Result<()> {
@@ -158,10 +174,12 @@ fn fetch_alone(remote: &Remote, id: u64, wait: bool, output: &Path, quiet: bool)
     let report = Report {
         version: VERSION.to_owned(),
         job: serde_json::Value::Null,
-        warnings: Vec::new(),
+        warnings: vec![UNKNOWN.to_owned()],
         path: PathStatistics::of(&path, &record.counters),
         verification: None,
         program: None,
+        keep_outs: Vec::new(),
+        roughing: None,
         last: None,
         record,
     };
@@ -175,13 +193,13 @@ fn fetch_alone(remote: &Remote, id: u64, wait: bool, output: &Path, quiet: bool)
     Ok(())
 }
 
-/// Lets the master drop a result that is written.
-fn leave(remote: &Remote, job: Option<u64>) -> Result<()> {
-    let Some(job) = job else {
-        return Ok(());
-    };
-    // The result is here; the master drops its own when it is old, if it does not hear of this.
-    let _ = runtime()?.block_on(submit::discard(remote, job));
+/// Lets the master drop results that are written.
+fn leave(remote: &Remote, jobs: &[u64]) -> Result<()> {
+    let runtime = runtime()?;
+    for &job in jobs {
+        // The result is here; the master drops its own when it is old, if it does not hear of this.
+        let _ = runtime.block_on(submit::discard(remote, job));
+    }
     Ok(())
 }
 
@@ -190,6 +208,14 @@ fn check_divisible(file: &JobFile) -> Result<()> {
     match file.job.method {
         Method::Local(local) if local.needs_whole_path() => Err(Error::OneProcess),
         _ => Ok(()),
+    }
+}
+
+/// A job that is two for a master is not for a command that speaks of one.
+fn check_single(file: &JobFile, command: &'static str) -> Result<()> {
+    match file.roughing {
+        Some(_) => Err(Error::OneJob { command }),
+        None => Ok(()),
     }
 }
 
@@ -245,7 +271,13 @@ fn perform(
     asked: &Asked,
     workers: Option<u32>,
     threads: Option<usize>,
-    compute: impl AsyncFnOnce(Part, &JobFile, Display, CancellationToken) -> Result<Outcome>,
+    compute: impl AsyncFnOnce(
+        Part,
+        &JobFile,
+        Vec<Job>,
+        Display,
+        CancellationToken,
+    ) -> Result<Vec<Outcome>>,
 ) -> Result<()> {
     let runtime = runtime()?;
     let stop = CancellationToken::new();
@@ -282,7 +314,13 @@ pub(crate) async fn carry_out(
     threads: Option<usize>,
     display: &Display,
     stop: &CancellationToken,
-    compute: impl AsyncFnOnce(Part, &JobFile, Display, CancellationToken) -> Result<Outcome>,
+    compute: impl AsyncFnOnce(
+        Part,
+        &JobFile,
+        Vec<Job>,
+        Display,
+        CancellationToken,
+    ) -> Result<Vec<Outcome>>,
 ) -> Result<Report> {
     display.tell("read", 0, 0);
     let begin = Instant::now();
@@ -292,35 +330,56 @@ pub(crate) async fn carry_out(
         part,
         file,
         job,
-        warnings,
+        mut warnings,
         shaped,
     } = prepared;
+    let targets = file.targets()?;
     let read = phase("read", begin);
     output::prepare_dir(asked.output)?;
     for warning in &warnings {
         display.note(&format!("warning: {warning}"));
     }
-    let computing = compute(part.clone(), &file, display.clone(), stop.clone());
-    let (path, mut record) = computing.await?;
+    let computing = compute(part.clone(), &file, targets, display.clone(), stop.clone());
+    let (digitized, mut record) = of_finish(computing.await?);
     record.phases.insert(0, read);
     let threads = threads.unwrap_or_else(system::cores);
+    let begin = Instant::now();
+    let made = {
+        let file = file.clone();
+        let making = tokio::task::spawn_blocking(move || passes::passes(&file, digitized));
+        let making = async { making.await.unwrap_or(Err(Error::Interrupted)) };
+        unless(stop.clone(), making).await?
+    };
+    if file.roughing.is_some() {
+        record.phases.push(phase("layers", begin));
+    }
+    let mut passes = made;
+    for warning in passes.warnings(&file) {
+        display.note(&format!("warning: {warning}"));
+        warnings.push(warning);
+    }
+    let mut left = None;
     let verified = if asked.how.no_verify {
         None
     } else {
         display.tell("verify", 0, 0);
         let begin = Instant::now();
-        let verifying = verified(part.clone(), file.clone(), path.positions(), threads);
+        let verifying = verified(&part, &file, &passes, threads);
         let verifying = trace::within(info_span!("verify"), verifying);
         let found = unless(stop.clone(), verifying).await?;
         record.phases.push(phase("verify", begin));
-        Some(found)
+        if let Some((remains, deepest)) = found.roughing {
+            left = remains;
+            passes.deepest = deepest;
+        }
+        Some(found.finish)
     };
     let last = match shaped {
         None => None,
         Some(shaped) => {
             display.tell("measure", 0, 0);
             let begin = Instant::now();
-            let positions = (!asked.how.no_verify).then(|| path.positions());
+            let positions = (!asked.how.no_verify).then(|| passes.finish.positions());
             let file = file.clone();
             let measuring = tokio::task::spawn_blocking(move || {
                 lasts::figures(&file, &shaped, positions.as_deref(), threads)
@@ -336,35 +395,81 @@ pub(crate) async fn carry_out(
         version: VERSION.to_owned(),
         job,
         warnings,
-        path: PathStatistics::of(&path, &record.counters),
+        path: PathStatistics::of(&passes.finish, &record.counters),
         verification,
         program: None,
+        keep_outs: passes.raised.clone(),
+        roughing: file.roughing.map(|_| RoughStatistics {
+            layers: passes.layers.len() as u64,
+            left,
+        }),
         last,
         record,
     };
     let made = Made {
         part,
         file,
-        path,
+        passes,
         clearances,
     };
     let writing = || write(asked, &made, report, display, stop);
     info_span!("write").in_scope(writing)
 }
 
-/// Verifies a path beside the runtime, and refuses one that gouges deeper than the job's tolerance.
+/// What was digitized for each pass, and the record of the finishing pass with the phases of all of them.
+fn of_finish(outcomes: Vec<Outcome>) -> (Vec<ToolPath>, Record) {
+    let (mut paths, mut phases, mut last) = (Vec::new(), Vec::new(), Record::default());
+    for (path, record) in outcomes {
+        let before = std::mem::replace(&mut last, record).phases;
+        phases.extend(before.into_iter().map(|phase| Phase {
+            name: format!("rough: {}", phase.name),
+            ..phase
+        }));
+        paths.push(path);
+    }
+    phases.append(&mut last.phases);
+    last.phases = phases;
+    (paths, last)
+}
+
+/// What verifying the passes found.
+struct Verified {
+    finish: (Verification, Clearances),
+    /// What the roughing leaves, and the most that the finishing pass takes of it.
+    roughing: Option<(Option<Left>, Option<f64>)>,
+}
+
+/// Verifies the finishing pass and the last layer of the roughing beside the runtime, and refuses one that
+/// gouges deeper than the job's tolerance.
 async fn verified(
-    part: Part,
-    file: JobFile,
-    positions: Vec<Position>,
+    part: &Part,
+    file: &JobFile,
+    passes: &Passes,
     threads: usize,
-) -> Result<(Verification, Clearances)> {
+) -> Result<Verified> {
+    let (part, file) = (part.clone(), file.clone());
+    let finish = passes.finish.positions();
+    // What none of the layers before goes below.
+    let rough = passes.layers.last().map(|layer| layer.path.positions());
     let checking = tokio::task::spawn_blocking(move || {
-        let found = verify::check(&part, &file, &positions, None, threads)?;
-        if let Some(tolerance) = verify::tolerance(&file) {
-            verify::hold(&found.0, tolerance, file.job.motion.path_tolerance)?;
+        let finish = verify::check(&part, &file.job, &finish, None, threads)?;
+        let tolerance = verify::tolerance(&file);
+        if let Some(tolerance) = tolerance {
+            verify::hold(&finish.0, tolerance, file.job.motion.path_tolerance)?;
         }
-        Ok(found)
+        let roughing = match file.roughing.zip(rough) {
+            None => None,
+            Some((roughing, positions)) => {
+                let job = Job {
+                    motion: roughing.motion,
+                    ..file.job
+                };
+                let (found, rough) = verify::check(&part, &job, &positions, None, threads)?;
+                let left = passes::left(&roughing, (&found, &rough), &finish.1, tolerance)?;
+                Some(left)
+            }
+        };
+        Ok(Verified { finish, roughing })
     });
     checking.await.unwrap_or(Err(Error::Interrupted))
 }
@@ -373,7 +478,7 @@ async fn verified(
 struct Made {
     part: Part,
     file: JobFile,
-    path: ToolPath,
+    passes: Passes,
     clearances: Option<Clearances>,
 }
 
@@ -400,8 +505,9 @@ fn write(
         ("cutter", &described(&report.job["cutter"])),
     ];
     let Made {
-        part, file, path, ..
+        part, file, passes, ..
     } = made;
+    let path = &passes.finish;
     // What is to be looked at takes about as long as the rest.
     let (drawn, seen, written) = thread::scope(|scope| {
         let looking = scope.spawn(|| {
@@ -413,9 +519,13 @@ fn write(
                 view::view(&sheets, &file.job.cutter, path, clearances),
             )
         });
-        let written = program::write(staging.dir(), path, file, &heading)?;
+        let written = program::write(staging.dir(), passes, file, &heading)?;
         going_on()?;
         csv::save(&staging.file(output::PATH), path)?;
+        for (number, layer) in (1..).zip(&passes.layers) {
+            going_on()?;
+            csv::save(&staging.file(&output::rough_name(number)), &layer.path)?;
+        }
         let (drawn, seen) = looking.join().unwrap_or_else(|panic| resume_unwind(panic));
         Ok::<_, Error>((drawn, seen, written))
     })?;
@@ -485,6 +595,15 @@ fn summarize(dir: &Path, report: &Report) {
             "\n{n} straight moves stray farther than the path tolerance: there the height jumps"
         ),
     };
+    let rough = report.roughing.map_or(String::new(), |rough| {
+        let left = rough.left.map_or(String::new(), |l| {
+            format!(
+                ", which leave {:.4} / {:.4} / {:.4} mm (least / median / 99 %)",
+                l.least, l.median, l.p99
+            )
+        });
+        format!("\nroughing in {} layers{left}", rough.layers)
+    });
     let (cutting, programs) = report.program.as_ref().map_or_else(Default::default, |p| {
         let names = [
             p.files.first(),
@@ -495,7 +614,7 @@ fn summarize(dir: &Path, report: &Report) {
         (program::describe(p), names.join(" to "))
     });
     say(&format!(
-        "{} positions{inserted}, {} without contact{beyond}{lost}{window}{verification}\n{cutting}\n{}\n{programs}\n{}\n{}\n{}",
+        "{} positions{inserted}, {} without contact{beyond}{lost}{window}{verification}{rough}\n{cutting}\n{}\n{programs}\n{}\n{}\n{}",
         path.positions,
         path.without_contact,
         dir.join(output::PATH).display(),

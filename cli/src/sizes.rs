@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::thread;
 
-use horma_core::Simd;
+use horma_core::{Job, Simd};
 use horma_formats::job::{self, JobFile, Overrides, Side};
 use horma_formats::output::{self, Staging};
 use horma_formats::sizes::{self, Size, Sizes};
@@ -162,20 +162,24 @@ async fn one(
     // Several at once have no place for the progress of each.
     let display = Display::new(true);
     let simd = args.simd.unwrap_or_else(Simd::best);
-    let computing = async |part, file: &JobFile, display, stop: CancellationToken| match cluster {
-        Some(local) => {
-            let (job, sharing) = (file.job, file.cluster.sharing);
-            let run = local.master.run(part, job, sharing, 1, progress(display));
-            unless(stop, async { Ok(run.await?) }).await
-        }
-        None => {
-            let job = file.job;
-            let stopped = stop.clone();
-            let run = move || here::run(&part, job, threads, simd, &display, &stopped);
-            let run = tokio::task::spawn_blocking(run);
-            unless(stop, async { run.await.unwrap_or(Err(Error::Interrupted)) }).await
-        }
-    };
+    let computing =
+        async |part, file: &JobFile, targets: Vec<Job>, display, stop: CancellationToken| {
+            match cluster {
+                Some(local) => {
+                    let (sharing, progress) = (file.cluster.sharing, progress(display));
+                    unless(stop, local.run_all(part, targets, sharing, &progress)).await
+                }
+                None => {
+                    let stopped = stop.clone();
+                    let run = move || {
+                        let run = |job| here::run(&part, job, threads, simd, &display, &stopped);
+                        targets.into_iter().map(run).collect()
+                    };
+                    let run = tokio::task::spawn_blocking(run);
+                    unless(stop, async { run.await.unwrap_or(Err(Error::Interrupted)) }).await
+                }
+            }
+        };
     let carrying = carry_out(
         &asked,
         &wanted.overrides,

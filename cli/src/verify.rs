@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use horma_core::{
-    Clearances, Deviation, Discretization, Gouge, Part, Position, Verification, verify_everywhere,
+    Clearances, Deviation, Discretization, Gouge, Job, Part, Position, Verification,
+    verify_everywhere,
 };
 use horma_formats::csv;
 use horma_formats::job::JobFile;
@@ -16,7 +17,7 @@ use crate::{run, say, system};
 pub(crate) fn verify(args: &args::Verify) -> Result<()> {
     let (part, file, positions) = read(&args.path, &args.job, &args.made)?;
     let threads = args.threads.map_or_else(system::cores, usize::from);
-    let (verification, _) = check(&part, &file, &positions, args.spacing, threads)?;
+    let (verification, _) = check(&part, &file.job, &positions, args.spacing, threads)?;
     if args.json {
         say(&serde_json::to_string_pretty(&verification).unwrap_or_default());
     } else {
@@ -41,12 +42,12 @@ pub(crate) fn read(
 /// Verifies positions on `threads` threads; also tells where what was found.
 pub(crate) fn check(
     part: &Part,
-    file: &JobFile,
+    job: &Job,
     positions: &[Position],
     spacing: Option<f64>,
     threads: usize,
 ) -> Result<(Verification, Clearances)> {
-    let (cutter, step) = (&file.job.cutter, Some(file.job.motion.step));
+    let (cutter, step) = (&job.cutter, Some(job.motion.step));
     Ok(system::pool(threads)?
         .install(|| verify_everywhere(part, cutter, step, positions, spacing))?)
 }

@@ -11,30 +11,30 @@ use horma_core::{Cutter, Station};
 
 use crate::error::Result;
 use crate::output;
-use crate::post::Heading;
+use crate::post::{Heading, Placed};
 
 /// Decimals of coordinates and of feeds.
 const DECIMALS: usize = 6;
 
+/// The most that the wheel goes around the part in one straight move from pass to pass, degrees.
+const CHORD: f64 = 10.0;
+
 /// Text that is gathered before it is handed on, in bytes.
 const CHUNK: usize = 1 << 16;
 
-/// Writes a course to `file`, each move in its duration: beside it first, then renamed. The cutter begins
-/// and ends `clearance` above the highest position, and plunges at `feed`, mm/min.
+/// Writes placed passes to `file`, each move in its duration: beside it first, then renamed. There are the
+/// durations of each pass.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be written.
 pub fn save(
     file: &Path,
-    stations: &[Station],
-    durations: &[f64],
+    placed: &Placed,
+    durations: &[Vec<f64>],
     cutter: &Cutter,
-    (feed, clearance): (f64, f64),
     heading: &Heading,
 ) -> Result<()> {
-    let heights = stations.iter().map(|s| s.axes[1]);
-    let safe = heights.fold(f64::MIN, f64::max) + clearance;
-    let retracted = |s: &Station| location(s, safe, cutter);
+    let retracted = |s: &Station| location(s, placed.safe, cutter);
     output::write(file, |out| {
         let mut text = String::new();
         for (label, value) in heading {
@@ -43,27 +43,37 @@ pub fn save(
         text += "UNITS/MM\n";
         text += &described(cutter);
         text += "MULTAX/ON\n";
-        let mut before: Option<[f64; 3]> = None;
-        for (i, station) in stations.iter().enumerate() {
-            let here = location(station, station.axes[1], cutter);
-            match before {
-                None => {
-                    text += "RAPID\n";
-                    go(&mut text, retracted(station));
-                    fed(&mut text, feed);
+        let mut last = None;
+        for (pass, durations) in placed.passes().zip(durations) {
+            if placed.legs.len() > 1 {
+                text += &format!("$$ pass: {}\n", ascii(pass.title));
+            }
+            if let (Some(from), Some(to)) = (last, pass.course.first()) {
+                around(&mut text, from, to, placed.safe, cutter);
+            }
+            last = pass.course.last();
+            let mut before: Option<[f64; 3]> = None;
+            for (i, station) in pass.course.iter().enumerate() {
+                let here = location(station, station.axes[1], cutter);
+                match before {
+                    None => {
+                        text += "RAPID\n";
+                        go(&mut text, retracted(station));
+                        fed(&mut text, pass.feed);
+                    }
+                    Some(from) => fed(&mut text, 60.0 * distance(from, here) / durations[i - 1]),
                 }
-                Some(from) => fed(&mut text, 60.0 * distance(from, here) / durations[i - 1]),
+                go(&mut text, here);
+                before = Some(here);
+                if text.len() >= CHUNK {
+                    out.write_all(text.as_bytes())?;
+                    text.clear();
+                }
             }
-            go(&mut text, here);
-            before = Some(here);
-            if text.len() >= CHUNK {
-                out.write_all(text.as_bytes())?;
-                text.clear();
+            if let Some(last) = last {
+                text += "RAPID\n";
+                go(&mut text, retracted(last));
             }
-        }
-        if let Some(last) = stations.last() {
-            text += "RAPID\n";
-            go(&mut text, retracted(last));
         }
         text += "FINI\n";
         out.write_all(text.as_bytes())
@@ -75,6 +85,23 @@ fn location(station: &Station, height: f64, cutter: &Cutter) -> [f64; 3] {
     let angle = station.axes[2].rem_euclid(360.0).to_radians();
     let x = station.axes[0] - cutter.half_width();
     [x, height * libm::cos(angle), -height * libm::sin(angle)]
+}
+
+/// The way around the part from where one pass ends to where the next begins, nowhere below `safe`.
+fn around(text: &mut String, from: &Station, to: &Station, safe: f64, cutter: &Cutter) {
+    let [along, _, turned] = from.to(to);
+    let chords = (turned.abs() / CHORD).ceil().max(1.0);
+    let height = safe / libm::cos((0.5 * CHORD).to_radians());
+    *text += "RAPID\n";
+    for i in 0..=chords as u32 {
+        let share = f64::from(i) / chords;
+        let [x, y, angle] = from.axes;
+        let on = Station {
+            axes: [x + share * along, y, angle + share * turned],
+            ..*from
+        };
+        go(text, location(&on, height, cutter));
+    }
 }
 
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -144,6 +171,7 @@ fn ascii(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::post::Pass;
 
     fn stations() -> Vec<Station> {
         let station = |i: u32| {
@@ -160,26 +188,39 @@ mod tests {
         (0..40).map(station).collect()
     }
 
-    fn text(stations: &[Station], durations: &[f64], cutter: &Cutter) -> String {
+    /// The passes as placed, and the text.
+    fn text(passes: &[Pass], durations: &[Vec<f64>], cutter: &Cutter) -> (Placed, String) {
+        let job = "[part]\nfiles = ['a.stl']\n[cutter]\nkind = 'ball'\nradius = 5\n
+            [motion]\nstep = 1\npoints_per_revolution = 90\n[program]\nclearance = 20";
+        let job = crate::job::parse(job, Path::new("job.toml"), &Default::default());
+        let program = job.expect("a job").program;
+        let placed = Placed::new(passes, None, cutter, &program).expect("it fits");
         let dir = tempfile::tempdir().expect("scratch");
         let file = dir.path().join("path.apt");
         let heading = [("part", "caf\u{e9}.step")];
-        save(&file, stations, durations, cutter, (1500.0, 20.0), &heading).expect("writable");
-        std::fs::read_to_string(file).expect("ASCII")
+        save(&file, &placed, durations, cutter, &heading).expect("writable");
+        let text = std::fs::read_to_string(file).expect("ASCII");
+        (placed, text)
     }
 
     #[test]
     fn locations_read_back_as_the_path_and_its_durations() {
-        let stations = stations();
+        let course = stations();
         let durations: Vec<f64> = (1..40).map(|i| 0.01 * f64::from(i)).collect();
         let cutter = Cutter::torus(40.0, 8.0).expect("a wheel");
-        let text = text(&stations, &durations, &cutter);
+        let pass = |title, feed| Pass {
+            title,
+            course: &course,
+            feed,
+        };
+        let passes = [pass("rough 1", 1500.0), pass("finish", 900.0)];
+        let (placed, text) = text(&passes, &[durations.clone(), durations.clone()], &cutter);
         let mut lines = text.lines();
         let mut next = || lines.next().expect("a line");
         assert_eq!(next(), "$$ part: caf?.step");
         assert_eq!(next(), "UNITS/MM");
         assert_eq!(next(), "CUTTER/96,8,40,8,0,0,16");
-        assert_eq!([next(), next()], ["MULTAX/ON", "RAPID"]);
+        assert_eq!(next(), "MULTAX/ON");
         let numbers = |line: &str, word: &str| -> Vec<f64> {
             let rest = line.strip_prefix(word).expect(line);
             let rest = rest.trim_end_matches(",MMPM");
@@ -201,24 +242,45 @@ mod tests {
             let off = found.iter().zip(expected).map(|(f, e)| (f - e).abs());
             assert!(off.fold(0.0, f64::max) < 2e-6, "{found:?} {expected:?}");
         };
-        let safe = stations.iter().map(|s| s.axes[1]).fold(0.0, f64::max) + 20.0;
-        near(turned(next()).0, &stations[0], safe);
-        let mut before = None;
-        for (i, station) in stations.iter().enumerate() {
-            let feed = numbers(next(), "FEDRAT/")[0];
-            let (found, here) = turned(next());
-            near(found, station, station.axes[1]);
-            match before.replace(here) {
-                None => assert_eq!(feed, 1500.0),
-                Some(from) => {
-                    let seconds = 60.0 * distance(from, here) / feed;
-                    let meant = durations[i - 1];
-                    assert!((seconds / meant - 1.0).abs() < 1e-6, "{seconds} {meant}");
+        let safe = course.iter().map(|s| s.axes[1]).fold(0.0, f64::max) + 20.0;
+        assert_eq!(placed.safe, safe);
+        for (n, pass) in placed.passes().enumerate() {
+            assert_eq!(next(), format!("$$ pass: {}", pass.title));
+            if n > 0 {
+                // Around the part to where it goes on.
+                assert_eq!(next(), "RAPID");
+                let mut before: Option<[f64; 3]> = None;
+                // From 1170 to 1440 degrees.
+                for _ in 0..28 {
+                    let (_, here) = turned(next());
+                    for share in 0..=10 {
+                        let share = 0.1 * f64::from(share);
+                        let from = before.unwrap_or(here);
+                        let [y, z] = [1, 2].map(|i| from[i] + share * (here[i] - from[i]));
+                        assert!(y.hypot(z) > safe - 1e-6, "{from:?} {here:?}");
+                    }
+                    before = Some(here);
                 }
             }
+            assert_eq!(next(), "RAPID");
+            near(turned(next()).0, &pass.course[0], safe);
+            let mut before = None;
+            for (i, station) in pass.course.iter().enumerate() {
+                let feed = numbers(next(), "FEDRAT/")[0];
+                let (found, here) = turned(next());
+                near(found, station, station.axes[1]);
+                match before.replace(here) {
+                    None => assert_eq!(feed, passes[n].feed),
+                    Some(from) => {
+                        let seconds = 60.0 * distance(from, here) / feed;
+                        let meant = durations[i - 1];
+                        assert!((seconds / meant - 1.0).abs() < 1e-6, "{seconds} {meant}");
+                    }
+                }
+            }
+            assert_eq!(next(), "RAPID");
+            near(turned(next()).0, &pass.course[39], safe);
         }
-        assert_eq!(next(), "RAPID");
-        near(turned(next()).0, &stations[39], safe);
         assert_eq!([Some(next()), lines.next()], [Some("FINI"), None]);
     }
 

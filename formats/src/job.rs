@@ -9,6 +9,7 @@ mod digitizing;
 mod echo;
 mod last;
 mod machine;
+mod passes;
 mod place;
 mod program;
 mod raw;
@@ -17,12 +18,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use horma_core::{
-    Axis, Contact, Culling, Cutter, Discretization, Distribution, Job, Local, Method, Motion,
-    MotionKind, Point, Sharing, unit,
+    Axis, Contact, Culling, Cutter, Discretization, Distribution, Job, KeepOut, Local, Method,
+    Motion, MotionKind, Point, Sharing, Solid, unit,
 };
 
 pub use self::last::{LastOf, Side};
 pub use self::machine::Machine;
+pub use self::passes::Roughing;
 pub use self::place::Place;
 use self::raw::{At, Given, RawAxis, RawCutter, RawJob};
 use crate::error::{Error, Result};
@@ -51,6 +53,12 @@ pub struct JobFile {
     pub axis: Axis,
     /// What to compute.
     pub job: Job,
+    /// What the part is cut from, if the job says so.
+    pub stock: Option<Solid>,
+    /// How that is roughed, if it is; only where there is a stock.
+    pub roughing: Option<Roughing>,
+    /// What the cutter must not enter.
+    pub keep_outs: Vec<KeepOut>,
     /// Where to compute it.
     pub cluster: Cluster,
     /// How to write it for the machine.
@@ -147,12 +155,16 @@ pub fn parse(text: &str, path: &Path, overrides: &Overrides) -> Result<JobFile> 
     job.validate().map_err(|e| source.core(&raw, e))?;
     let cluster = source.cluster(&raw)?;
     source.in_one_process(&raw, method, cluster.workers)?;
+    let program = source.program(&raw)?;
     Ok(JobFile {
         files,
         axis,
         job,
+        stock: source.stock(&raw)?,
+        roughing: source.roughing(&raw, job, program.feed)?,
+        keep_outs: source.keep_outs(&raw)?,
         cluster,
-        program: source.program(&raw)?,
+        program,
         machine: source.machine(&raw)?,
         last: source.last(&raw)?,
     })
@@ -322,7 +334,7 @@ impl Source<'_> {
             from: motion.from.as_ref().map(|g| g.value),
             to: motion.to.as_ref().map(|g| g.value),
             path_tolerance: motion.path_tolerance.as_ref().map(|g| g.value),
-            lead: [0.0; 2],
+            lead: [&motion.lead_in, &motion.lead_out].map(|g| g.as_ref().map_or(0.0, |g| g.value)),
         })
     }
 

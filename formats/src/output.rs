@@ -12,6 +12,8 @@ use crate::post::Control;
 
 /// The tool path.
 pub const PATH: &str = "path.csv";
+/// Begins the name of the path of a layer of the roughing.
+const ROUGH: &str = "rough-";
 /// What was computed, by whom and how fast.
 pub const REPORT: &str = "report.json";
 /// The path as cutter locations.
@@ -62,9 +64,22 @@ pub fn program_name(control: Control, part: Option<u32>) -> String {
     }
 }
 
+/// The path of a layer of the roughing, counted from 1.
+pub fn rough_name(layer: usize) -> String {
+    format!("{ROUGH}{layer}.csv")
+}
+
 /// Whether a run may give a file of its output directory this name.
 fn of_run(name: &str) -> bool {
-    [PATH, REPORT, APT, PREVIEW, VIEW].contains(&name) || of_program(name)
+    [PATH, REPORT, APT, PREVIEW, VIEW].contains(&name) || of_program(name) || of_rough(name)
+}
+
+fn of_rough(name: &str) -> bool {
+    let layer = name
+        .strip_prefix(ROUGH)
+        .and_then(|n| n.strip_suffix(".csv"));
+    let layer = layer.and_then(|n| n.parse().ok());
+    layer.is_some_and(|layer| layer > 0 && rough_name(layer) == name)
 }
 
 fn of_program(name: &str) -> bool {
@@ -373,6 +388,21 @@ mod tests {
             "path_00001.ngc",
             "path-0001.ngc",
             "pathology.nc",
+        ] {
+            assert!(!of_run(foreign), "{foreign}");
+        }
+    }
+
+    #[test]
+    fn layers_are_known_by_their_names() {
+        assert_eq!(rough_name(12), "rough-12.csv");
+        assert!(of_run("rough-1.csv") && of_run("rough-200.csv"));
+        for foreign in [
+            "rough-0.csv",
+            "rough-01.csv",
+            "rough-+1.csv",
+            "rough-1.txt",
+            "rough-.csv",
         ] {
             assert!(!of_run(foreign), "{foreign}");
         }

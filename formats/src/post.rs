@@ -1,7 +1,8 @@
 //! Programs for machines: a path in the dialect of a control.
 //!
 //! Every program retracts first, then travels, and plunges last; under G93 every move has its F, and G94 is
-//! restored before the retract at the end. It starts no spindle and changes no tool: nothing is known of
+//! restored before the retract at the end. So does each of its passes, and the part goes on turning from one
+//! to the next. It starts no spindle and changes no tool: nothing is known of
 //! either. Each file of a program that is split begins and ends in the same way, so it can be run alone. No
 //! position is left out or simplified. How long a move takes is decided in the core; what a program says is
 //! rounded here, towards slower.
@@ -13,8 +14,10 @@ mod write;
 
 use std::path::Path;
 
+use horma_core::{MachineAxis, Station};
+
 pub use self::dialect::{Control, Counted, Dialect, Direction, Group, Inverse, Modulo};
-pub use self::placed::Placed;
+pub use self::placed::{Leg, Placed};
 use self::write::Script;
 use crate::error::{Error, Result};
 use crate::output;
@@ -123,6 +126,11 @@ impl Units {
 }
 
 impl Program {
+    /// A turn of the part, in increments.
+    fn turn(&self) -> i64 {
+        360 * 10_i64.pow(u32::from(self.decimals[MachineAxis::Rotation as usize]))
+    }
+
     /// The shortest move that the control can be told, s.
     pub fn shortest(&self) -> f64 {
         match self.feed_mode {
@@ -132,7 +140,19 @@ impl Program {
     }
 }
 
-/// Writes the program of a course, each move in its duration, to files in `dir`; their names, in order.
+/// One pass of the cutter over the part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pass<'a> {
+    /// What it is called where there are several.
+    pub title: &'a str,
+    /// Its positions, at least one.
+    pub course: &'a [Station],
+    /// Feed of its plunge, mm/min.
+    pub feed: f64,
+}
+
+/// Writes the program of placed passes, each move in its duration, to files in `dir`; their names, in order.
+/// There are the durations of each pass.
 ///
 /// # Errors
 /// [`Error::NoFeed`] for a move that F cannot count, [`Error::TooManyFiles`], [`Error::Io`] if a file cannot
@@ -140,7 +160,7 @@ impl Program {
 pub fn save(
     dir: &Path,
     placed: &Placed,
-    durations: &[f64],
+    durations: &[Vec<f64>],
     program: &Program,
     heading: &Heading,
 ) -> Result<Vec<String>> {
@@ -158,7 +178,7 @@ pub fn save(
         let name = output::program_name(program.control, program.split.map(|_| part));
         first = output::write(&dir.join(&name), |out| script.write(first, part, out))?;
         names.push(name);
-        if first + 1 >= placed.increments.len() {
+        if first == placed.increments.len() {
             return Ok(names);
         }
     }

@@ -6,7 +6,7 @@ use std::io::Write;
 use std::path::Path;
 
 use horma_core::{
-    Bound, Counters, MachineAxis, Record, Station, Steady, Timing, ToolPath, Verification, peaks,
+    Bound, Counters, MachineAxis, Peak, Raised, Record, Steady, Timing, ToolPath, Verification,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -31,6 +31,12 @@ pub struct Report {
     pub verification: Option<Verification>,
     /// The program for the machine; nothing if none was written.
     pub program: Option<ProgramStatistics>,
+    /// What each keep-out did to the finishing pass, in the job's order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub keep_outs: Vec<Raised>,
+    /// What the roughing leaves; nothing if the job speaks of none.
+    #[serde(default)]
+    pub roughing: Option<RoughStatistics>,
     /// What the last measures; nothing if the job speaks of none.
     #[serde(default)]
     pub last: Option<Lasts>,
@@ -77,6 +83,46 @@ impl PathStatistics {
     }
 }
 
+/// A roughing in figures.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RoughStatistics {
+    /// Its layers.
+    pub layers: u64,
+    /// What they leave on the designed surface; nothing if that was not verified.
+    pub left: Option<Left>,
+}
+
+/// What is left on the samples of a designed surface, mm along its normal.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Left {
+    /// The least, at positions.
+    pub least: f64,
+    /// 50th percentile.
+    pub median: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// The most.
+    pub max: f64,
+}
+
+/// A pass in figures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PassStatistics {
+    /// What it is called in the program.
+    pub name: String,
+    /// The file of its path.
+    pub path: String,
+    /// Number of positions.
+    pub positions: u64,
+    /// Length of the cutter's way over the part, mm.
+    pub length: f64,
+    /// How long it takes, s.
+    pub seconds: f64,
+    /// The most that it takes of what the passes before it left, mm: at a position along the attack axis, for
+    /// a finishing pass after a roughing along the normal of the surface; nothing if that is not known.
+    pub deepest_cut: Option<f64>,
+}
+
 /// A program in figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ProgramStatistics {
@@ -84,13 +130,16 @@ pub struct ProgramStatistics {
     pub dialect: String,
     /// Its files, in the order in which they are run.
     pub files: Vec<String>,
-    /// How long the cutter is at work, s: from the first position to the last.
+    /// Its passes, in their order.
+    #[serde(default)]
+    pub passes: Vec<PassStatistics>,
+    /// How long the cutter is at work, s: from the first position to the last of each pass.
     pub seconds: f64,
     /// What keeps moves from being shorter, with the share of the moves that it holds; the greatest first.
     pub bounds: Vec<(String, f64)>,
     /// The most that is asked of each axis.
     pub peaks: Vec<AxisPeak>,
-    /// The same path at the greatest steady speed of the spindle within the same limits; nothing if the
+    /// The same passes at the greatest steady speed of the spindle within the same limits; nothing if the
     /// part does not turn all the time.
     pub steady: Option<SteadySpindle>,
 }
@@ -117,34 +166,57 @@ pub struct SteadySpindle {
     pub seconds: f64,
 }
 
+/// A pass as it is run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ran {
+    /// It in figures.
+    pub figures: PassStatistics,
+    /// How long its moves take, and why.
+    pub timing: Timing,
+    /// The most that is asked of each axis.
+    pub peaks: [Peak; 3],
+    /// It at a steady speed.
+    pub steady: Option<Steady>,
+}
+
 impl ProgramStatistics {
-    /// Of a program in these files, that runs these stations in that time.
-    pub fn of(
-        program: &Program,
-        files: Vec<String>,
-        stations: &[Station],
-        timing: &Timing,
-        steady: Option<Steady>,
-    ) -> Self {
-        let peaks = MachineAxis::ALL
-            .into_iter()
-            .zip(peaks(stations, &timing.durations));
-        let peaks = peaks.map(|(axis, peak)| AxisPeak {
-            axis: axis.name().to_owned(),
-            velocity: peak.velocity,
-            acceleration: peak.acceleration,
-            jerk: peak.jerk,
+    /// Of a program in these files, of these passes.
+    pub fn of(program: &Program, files: Vec<String>, passes: Vec<Ran>) -> Self {
+        let peaks = MachineAxis::ALL.map(|axis| {
+            let peaks = passes.iter().map(|p| p.peaks[axis as usize]);
+            let peak = peaks.fold(Peak::default(), Peak::max);
+            AxisPeak {
+                axis: axis.name().to_owned(),
+                velocity: peak.velocity,
+                acceleration: peak.acceleration,
+                jerk: peak.jerk,
+            }
         });
+        let bounds: Vec<Bound> = passes
+            .iter()
+            .flat_map(|p| p.timing.bounds.clone())
+            .collect();
+        let steady: Option<Vec<Steady>> = passes.iter().map(|p| p.steady).collect();
         Self {
             dialect: program.control.dialect().name.to_owned(),
             files,
-            seconds: timing.durations.iter().sum(),
-            bounds: shares(&timing.bounds),
-            peaks: peaks.collect(),
-            steady: steady.map(|s| SteadySpindle {
-                turns: s.velocity / 6.0,
-                seconds: s.seconds,
-            }),
+            seconds: passes.iter().map(|p| p.figures.seconds).sum(),
+            bounds: shares(&bounds),
+            peaks: peaks.to_vec(),
+            steady: steady.map(|all| SteadySpindle::of(&all)),
+            passes: passes.into_iter().map(|p| p.figures).collect(),
+        }
+    }
+}
+
+impl SteadySpindle {
+    /// All of them at the speed of the slowest.
+    fn of(all: &[Steady]) -> Self {
+        let slowest = all.iter().map(|s| s.velocity).fold(f64::INFINITY, f64::min);
+        let seconds = all.iter().map(|s| s.seconds * (s.velocity / slowest));
+        Self {
+            turns: slowest / 6.0,
+            seconds: seconds.sum(),
         }
     }
 }
@@ -255,6 +327,8 @@ mod tests {
             path: PathStatistics::of(&path(), &Counters::default()),
             verification: None,
             program: None,
+            keep_outs: Vec::new(),
+            roughing: None,
             last: None,
             record: Record {
                 phases: vec![Phase {

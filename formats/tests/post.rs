@@ -10,7 +10,7 @@ use std::path::Path;
 
 use horma_core::{AxisLimits, Cutter, Limits, Station, timing};
 use horma_formats::post::{
-    Angles, Control, FeedMode, Placed, Program, Programmed, Split, Units, Word, save,
+    Angles, Control, FeedMode, Pass, Placed, Program, Programmed, Split, Units, Word, save,
 };
 use post::course::{course, cutter};
 use post::reader::{Meaning, Move, check, read};
@@ -38,30 +38,52 @@ fn program(control: Control) -> Program {
     }
 }
 
-/// The texts of a program's files, and how long its moves are meant to take.
+/// The texts of the files of a program of these passes, and how long their moves are meant to take. Each pass
+/// is at half the feed of the one before.
 fn written(
-    course: &[Station],
+    courses: &[Vec<Station>],
+    clear: Option<f64>,
     program: &Program,
     axes: [AxisLimits; 3],
-) -> (Vec<String>, Vec<f64>) {
+) -> (Vec<String>, Vec<Vec<f64>>) {
     let dir = tempfile::tempdir().expect("scratch");
-    let placed = Placed::new(course, &cutter(), program).expect("it fits");
-    let limits = Limits {
-        feed: program.feed / 60.0,
-        shortest: program.shortest(),
-        axes,
-    };
-    let durations = timing(&placed.stations, &limits).durations;
+    let names = ["rough 1", "rough 2", "finish"];
+    let mut feed = 2.0 * program.feed;
+    let passes = courses.iter().zip(names).map(|(course, title)| {
+        feed *= 0.5;
+        Pass {
+            title,
+            course,
+            feed,
+        }
+    });
+    let passes: Vec<Pass> = passes.collect();
+    let placed = Placed::new(&passes, clear, &cutter(), program).expect("it fits");
+    let durations = placed.passes().map(|pass| {
+        let limits = Limits {
+            feed: pass.feed / 60.0,
+            shortest: program.shortest(),
+            axes,
+        };
+        timing(pass.course, &limits).durations
+    });
+    let durations: Vec<Vec<f64>> = durations.collect();
     let heading = [("job", "golden.toml"), ("cutter", "kind \"torus\"")];
     let names = save(dir.path(), &placed, &durations, program, &heading).expect("writable");
     let read = |name: &String| std::fs::read_to_string(dir.path().join(name)).expect("ASCII");
     (names.iter().map(read).collect(), durations)
 }
 
-/// Compares with a golden file; with HORMA_BLESS set it writes it instead.
+/// Compares a program of one pass with a golden file.
 #[track_caller]
 fn golden(name: &str, program: &Program) {
-    let (texts, _) = written(&course(13, 8, 0x00c0_8040), program, [AxisLimits::NONE; 3]);
+    golden_passes(name, &[course(13, 8, 0x00c0_8040)], program);
+}
+
+/// Compares with a golden file; with HORMA_BLESS set it writes it instead.
+#[track_caller]
+fn golden_passes(name: &str, courses: &[Vec<Station>], program: &Program) {
+    let (texts, _) = written(courses, None, program, [AxisLimits::NONE; 3]);
     let found = texts.concat();
     let file = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("tests/golden")
@@ -130,6 +152,22 @@ fn what_shops_do_differently_looks_as_it_was_looked_at() {
         &Program {
             feed_mode: FeedMode::Minute,
             ..program(Control::Beckhoff)
+        },
+    );
+}
+
+#[test]
+fn several_passes_look_as_they_were_looked_at() {
+    let courses = [(9, 0x00e0_8040), (9, 0x00d0_8040), (13, 0x00c0_8040)];
+    let courses = courses.map(|(positions, shape)| course(positions, 8, shape));
+    golden_passes("linuxcnc_passes.ngc", &courses, &program(Control::LinuxCnc));
+    golden_passes(
+        "fanuc_passes_rezero_split.nc",
+        &courses,
+        &Program {
+            angles: Angles::Rezero,
+            split: Some(Split::Moves(12)),
+            ..program(Control::Fanuc)
         },
     );
 }
@@ -205,14 +243,17 @@ proptest! {
     fn every_program_says_its_path_within_the_limits(
         seed in any::<u64>(),
         control in 0..6_usize,
-        positions in 1..300_usize,
+        positions in prop::collection::vec(1..150_usize, 1..4),
+        clear in prop::option::of(50.0..300.0_f64),
         points in 5..40_usize,
         shape in any::<u32>(),
         hard in 0.05..20.0_f64,
         jerk in prop::option::of(1.0e4..1.0e6_f64),
     ) {
         let program = combination(seed, Control::ALL[control]);
-        let course = course(positions, points, shape);
+        let courses = positions.iter().zip(0..);
+        let courses = courses.map(|(&n, pass)| course(n, points, shape.rotate_left(5 * pass)));
+        let courses: Vec<Vec<Station>> = courses.collect();
         let limit = |velocity: f64| AxisLimits {
             velocity,
             acceleration: 200.0 * hard,
@@ -223,7 +264,7 @@ proptest! {
             axes[1].jerk = jerk;
         }
         let program = Program { feed: 6000.0, ..program };
-        let (texts, durations) = written(&course, &program, axes);
+        let (texts, durations) = written(&courses, clear, &program, axes);
         let meaning = meaning(&program);
         let moves: Vec<Vec<Move>> = texts.iter().map(|t| read(t, &meaning)).collect();
         for text in &texts {
@@ -237,15 +278,18 @@ proptest! {
             let unit = if axis < 2 { program.units.length() } else { 1.0 };
             0.5 * unit / 10_f64.powi(i32::from(program.decimals[axis]))
         });
-        let found = check(&moves, &course, rounding, program.clearance);
+        let found = check(&moves, &courses, rounding, program.clearance, clear);
         let found = found.map_err(|e| TestCaseError::fail(format!("{e}\n{}", texts.concat())))?;
         prop_assert_eq!(found.len(), durations.len());
-        for (read, meant) in found.iter().zip(&durations) {
-            let slack = 1.0e-9 * meant + read.rounding;
-            prop_assert!(read.seconds >= meant - 1.0e-9 * meant && read.seconds <= meant + slack,
-                "{} s instead of {meant} s", read.seconds);
+        for (found, durations) in found.iter().zip(&durations) {
+            prop_assert_eq!(found.len(), durations.len());
+            for (read, meant) in found.iter().zip(durations) {
+                let slack = 1.0e-9 * meant + read.rounding;
+                prop_assert!(read.seconds >= meant - 1.0e-9 * meant && read.seconds <= meant + slack,
+                    "{} s instead of {meant} s", read.seconds);
+            }
+            post::reader::within(found, &axes.map(|a| [a.velocity, a.acceleration, a.jerk]))
+                .map_err(|e| TestCaseError::fail(format!("{e}\n{}", texts.concat())))?;
         }
-        post::reader::within(&found, &axes.map(|a| [a.velocity, a.acceleration, a.jerk]))
-            .map_err(|e| TestCaseError::fail(format!("{e}\n{}", texts.concat())))?;
     }
 }

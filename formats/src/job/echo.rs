@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::machine::{LIMITS, Machine};
 use super::program::{ANGLES, FEED_MODES, POINTS, UNITS};
-use super::{CONTACTS, JobFile, KINDS, last};
+use super::{CONTACTS, JobFile, KINDS, last, passes};
 use crate::post::{Program, Split};
 
 impl JobFile {
@@ -33,6 +33,8 @@ impl JobFile {
                 "points_per_revolution": motion.points_per_revolution,
                 "from": motion.from,
                 "to": motion.to,
+                "lead_in": motion.lead[0],
+                "lead_out": motion.lead[1],
                 "path_tolerance": motion.path_tolerance,
             },
             "digitizing": digitizing_echo(&self.job),
@@ -44,6 +46,9 @@ impl JobFile {
             "program": program_echo(&self.program),
             "machine": machine_echo(&self.machine),
         });
+        for (section, said) in passes::echo(self) {
+            echo[section] = said;
+        }
         for (section, said) in self.last.iter().flat_map(last::echo) {
             if !said.is_null() {
                 echo[section] = said;

@@ -24,8 +24,9 @@ pub struct Machine {
 pub(super) const LIMITS: [&str; 3] = ["velocity", "acceleration", "jerk"];
 
 impl Machine {
-    /// What a program's moves have to keep to.
-    pub fn limits(&self, program: &Program) -> Limits {
+    /// What the moves of a pass have to keep to: at this feed, mm/min, and at most so many turns a minute, if
+    /// the machine does not make fewer.
+    pub fn limits(&self, program: &Program, feed: f64, turns: Option<f64>) -> Limits {
         let mut axes = self.axes.map(|limits| {
             let [velocity, acceleration, jerk] = limits.map(|l| l.unwrap_or(f64::INFINITY));
             AxisLimits {
@@ -35,10 +36,11 @@ impl Machine {
             }
         });
         let rotation = &mut axes[MachineAxis::Rotation as usize];
-        let turns = self.turns.map_or(f64::INFINITY, |turns| 6.0 * turns);
-        rotation.velocity = rotation.velocity.min(turns);
+        for turns in self.turns.into_iter().chain(turns) {
+            rotation.velocity = rotation.velocity.min(6.0 * turns);
+        }
         Limits {
-            feed: program.feed / 60.0,
+            feed: feed / 60.0,
             shortest: program.shortest(),
             axes,
         }
@@ -109,7 +111,7 @@ impl Source<'_> {
         Err(self.wrong(Some(&given.at), what))
     }
 
-    fn positive(&self, given: &Given<f64>, what: &str, unit: &str) -> Result<f64> {
+    pub(super) fn positive(&self, given: &Given<f64>, what: &str, unit: &str) -> Result<f64> {
         if given.value.is_finite() && given.value > 0.0 {
             return Ok(given.value);
         }

@@ -61,6 +61,10 @@ pub(super) struct RawJob {
     pub(super) digitizing: RawDigitizing,
     #[serde(default)]
     pub(super) cluster: RawCluster,
+    pub(super) stock: Option<Given<RawStock>>,
+    pub(super) roughing: Option<Given<RawRoughing>>,
+    #[serde(default)]
+    pub(super) keep_out: Vec<Given<RawKeepOut>>,
     #[serde(default)]
     pub(super) program: RawProgram,
     #[serde(default)]
@@ -119,6 +123,8 @@ pub(super) struct RawMotion {
     pub(super) points_per_revolution: Option<Given<i64>>,
     pub(super) from: Option<Given<f64>>,
     pub(super) to: Option<Given<f64>>,
+    pub(super) lead_in: Option<Given<f64>>,
+    pub(super) lead_out: Option<Given<f64>>,
     pub(super) path_tolerance: Option<Given<f64>>,
 }
 
@@ -140,6 +146,38 @@ pub(super) struct RawCluster {
     pub(super) workers: Option<Given<i64>>,
     pub(super) distribution: Option<Given<String>>,
     pub(super) extents_per_worker: Option<Given<i64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawStock {
+    pub(super) kind: Option<Given<String>>,
+    pub(super) radius: Option<Given<f64>>,
+    pub(super) height: Option<Given<f64>>,
+    pub(super) width: Option<Given<f64>>,
+    pub(super) from: Option<Given<f64>>,
+    pub(super) to: Option<Given<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawRoughing {
+    pub(super) allowance: Option<Given<f64>>,
+    pub(super) depth_of_cut: Option<Given<f64>>,
+    pub(super) step: Option<Given<f64>>,
+    pub(super) points_per_revolution: Option<Given<i64>>,
+    pub(super) path_tolerance: Option<Given<f64>>,
+    pub(super) feed: Option<Given<f64>>,
+    pub(super) turns: Option<Given<f64>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawKeepOut {
+    pub(super) from: Option<Given<f64>>,
+    pub(super) to: Option<Given<f64>>,
+    pub(super) radius: Option<Given<f64>>,
+    pub(super) margin: Option<Given<f64>>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -334,6 +372,8 @@ impl RawJob {
             "points_per_revolution" => number(&motion?.points_per_revolution),
             "from" => number(&motion?.from),
             "to" => number(&motion?.to),
+            "lead_in" => number(&motion?.lead_in),
+            "lead_out" => number(&motion?.lead_out),
             "path_tolerance" => number(&motion?.path_tolerance),
             _ => {
                 let mut dimensions = self.cutter.as_ref()?.value.dimensions().into_iter();

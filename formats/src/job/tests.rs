@@ -17,6 +17,7 @@ kind = "rings"
 step = 2
 points_per_revolution = 360
 from = -3
+lead_in = 4
 [digitizing]
 contact = "point"
 method = "brute"
@@ -68,6 +69,7 @@ fn a_full_job_means_what_it_says() {
         (MotionKind::Rings, 2.0)
     );
     assert_eq!((j.job.motion.from, j.job.motion.to), (Some(-3.0), None));
+    assert_eq!(j.job.motion.lead, [4.0, 0.0]);
     assert_eq!(
         (j.job.contact, j.job.method),
         (Contact::Point, Method::Brute)
@@ -487,14 +489,17 @@ turns = 60";
 fn a_machine_has_the_limits_that_are_given() {
     let j = valid(&with(MACHINE));
     assert_eq!(j.machine.ranges, [Some(-20.0..=300.0), None]);
-    let limits = j.machine.limits(&j.program);
+    let limits = j.machine.limits(&j.program, j.program.feed, None);
     assert_eq!((limits.feed, limits.shortest), (25.0, 0.0));
     let [travel, attack, rotation] = limits.axes;
     assert_eq!((travel.velocity, travel.jerk), (500.0, f64::INFINITY));
     assert_eq!((attack.acceleration, attack.jerk), (20_000.0, 1.0e6));
     assert_eq!((rotation.velocity, rotation.acceleration), (360.0, 3600.0));
     let j = valid(JOB);
-    assert_eq!(j.machine.limits(&j.program).axes, [AxisLimits::NONE; 3]);
+    assert_eq!(
+        j.machine.limits(&j.program, j.program.feed, None).axes,
+        [AxisLimits::NONE; 3]
+    );
 }
 
 #[test]
@@ -546,15 +551,19 @@ fn machines_that_cannot_be_are_refused() {
 fn the_echo_is_a_job_again() {
     let path = JOB.replacen("step = 2", "step = 2\npath_tolerance = 0.005", 1);
     let more = "travel = '-Z'\nangles = 'rezero'\napt = true\nsplit = { moves = 5000 }\n";
-    let full = format!("{path}{more}{MACHINE}\n{LAST}");
+    let full = format!("{path}{more}{MACHINE}\n{LAST}{PASSES}");
     for text in [path.clone(), full] {
         let j = valid(&text);
         let mut echo = j.echo();
         // TOML has no null.
-        for section in ["motion", "program"] {
-            let section = echo[section].as_object_mut().expect("a table");
-            section.retain(|_, v| !v.is_null());
+        for section in ["motion", "program", "stock", "roughing"] {
+            if let Some(section) = echo[section].as_object_mut() {
+                section.retain(|_, v| !v.is_null());
+            }
         }
+        echo.as_object_mut()
+            .expect("a job")
+            .retain(|_, v| !v.is_null());
         let text = toml::to_string(&echo).expect("TOML");
         let again = parse(&text, Path::new("job.toml"), &Overrides::default()).expect("valid");
         assert_eq!(again, j);
@@ -635,4 +644,154 @@ fn no_text_makes_it_panic() {
 fn a_missing_file_is_named() {
     let error = read(Path::new("none/job.toml"), &Overrides::default()).expect_err("missing");
     assert!(error.to_string().contains("none/job.toml"), "{error}");
+}
+
+const PASSES: &str = "
+[stock]
+kind = 'block'
+height = 120
+width = 100.5
+from = -5
+[roughing]
+allowance = 1.5
+depth_of_cut = 12
+step = 6
+turns = 30
+[[keep_out]]
+from = -60
+to = -12
+radius = 55
+[[keep_out]]
+from = 270
+to = 330
+radius = 30
+margin = 1
+";
+
+#[test]
+fn passes_cut_as_the_job_does_unless_they_say_otherwise() {
+    let j = valid(&format!("{JOB}{PASSES}"));
+    let stock = j.stock.expect("a block");
+    let section = horma_core::Section::Rectangle {
+        height: 120.0,
+        width: 100.5,
+    };
+    assert_eq!((stock.x.low, stock.x.high), (-5.0, f64::INFINITY));
+    assert_eq!(stock.section, section);
+    let roughing = j.roughing.expect("a roughing");
+    assert_eq!((roughing.allowance, roughing.depth_of_cut), (1.5, 12.0));
+    let motion = Motion {
+        step: 6.0,
+        ..j.job.motion
+    };
+    assert_eq!(roughing.motion, motion);
+    assert_eq!((roughing.feed, roughing.turns), (1500.0, Some(30.0)));
+    let targets = j.targets().expect("cutters");
+    assert_eq!(targets.len(), 2);
+    assert_eq!(Ok(targets[0].cutter), Cutter::torus(40.0, 9.5));
+    assert_eq!((targets[0].motion, targets[1]), (motion, j.job));
+    assert_eq!(j.keep_outs.len(), 2);
+    assert_eq!((j.keep_outs[0].margin, j.keep_outs[1].margin), (0.0, 1.0));
+    // The block's corner is further out than either, and the wheel has 48.
+    let corner = 0.5 * 120.0_f64.hypot(100.5);
+    assert_eq!(j.clear(), Some(corner + 48.0));
+    assert_eq!(
+        (
+            valid(JOB).clear(),
+            valid(JOB).targets().map(|t| t.len()).ok()
+        ),
+        (None, Some(1))
+    );
+    let limits = j.machine.limits(&j.program, roughing.feed, roughing.turns);
+    assert_eq!(limits.axes[2].velocity, 180.0);
+    let cylinder = valid(&format!("{JOB}[stock]\nkind = 'cylinder'\nradius = 60"));
+    let section = horma_core::Section::Disc { radius: 60.0 };
+    assert_eq!(cylinder.stock.map(|s| s.section), Some(section));
+}
+
+#[test]
+fn passes_that_cannot_be_are_refused_at_their_place() {
+    for (old, new, expected) in [
+        ("kind = 'block'", "", "[stock] has no kind"),
+        (
+            "kind = 'block'",
+            "kind = 'ball'",
+            "unknown stock 'ball'; known: cylinder, block",
+        ),
+        ("height = 120", "", "a block needs height, in mm"),
+        (
+            "height = 120",
+            "height = 120\nradius = 3",
+            "radius does not belong to a block, which has height and width",
+        ),
+        (
+            "width = 100.5",
+            "width = -1",
+            "width is -1, but must be greater than 0",
+        ),
+        (
+            "from = -5",
+            "from = 5\nto = 5",
+            "must not end before it begins",
+        ),
+        ("allowance = 1.5", "", "[roughing] has no allowance"),
+        (
+            "allowance = 1.5",
+            "allowance = -1",
+            "allowance is -1, but must be from 0 to 1000 mm",
+        ),
+        (
+            "depth_of_cut = 12",
+            "depth_of_cut = 0",
+            "depth_of_cut is 0, but must be greater than 0",
+        ),
+        ("step = 6", "step = 0", "step is 0, but must be"),
+        (
+            "step = 6",
+            "step = 6\npoints_per_revolution = 0",
+            "points_per_revolution is 0, but",
+        ),
+        (
+            "step = 6",
+            "step = 6\npath_tolerance = 0",
+            "path_tolerance is 0, but",
+        ),
+        (
+            "turns = 30",
+            "turns = 0",
+            "turns is 0, but must be greater than 0",
+        ),
+        (
+            "turns = 30",
+            "feed = 0",
+            "feed is 0, but must be greater than 0",
+        ),
+        ("radius = 55", "", "[[keep_out]] has no radius"),
+        (
+            "radius = 55",
+            "radius = 0",
+            "radius is 0, but must be greater than 0",
+        ),
+        ("to = -12", "to = -80", "must not end before it begins"),
+        (
+            "margin = 1",
+            "margin = -1",
+            "margin is -1, but must be from 0",
+        ),
+        ("margin = 1", "inside = 1", "unknown key"),
+    ] {
+        assert!(PASSES.contains(old), "{old}");
+        let text = format!("{JOB}{}", PASSES.replacen(old, new, 1));
+        let error = job(&text, &Overrides::default())
+            .expect_err(new)
+            .to_string();
+        assert!(
+            error.contains(expected) && error.contains("jobs/job.toml:"),
+            "{new}: {error}"
+        );
+    }
+    let (_, rest) = PASSES.split_once("[roughing]").expect("there");
+    let error = job(&format!("{JOB}[roughing]{rest}"), &Overrides::default());
+    let error = error.expect_err("no stock").to_string();
+    assert!(error.contains("[roughing] needs a [stock]"), "{error}");
 }

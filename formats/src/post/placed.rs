@@ -1,22 +1,26 @@
-//! A course in the numbers of a program: least increments of each axis, rounded once and for all.
+//! Passes in the numbers of a program: least increments of each axis, rounded once and for all.
 //!
 //! Everything after this counts in them, so that what is planned and checked is what the file says.
 
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 
 use horma_core::{Cutter, MachineAxis, Station};
 
-use super::{Angles, Program, Programmed, Spot};
+use super::{Angles, Pass, Program, Programmed, Spot};
 use crate::error::{Error, Result};
 
-/// A course in least increments.
+/// Passes in least increments.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Placed {
-    /// Each position, in the order of [`MachineAxis::ALL`].
+    /// Each position of all passes, in the order of [`MachineAxis::ALL`].
     pub increments: Vec<[i64; 3]>,
-    /// The attack axis when the cutter is retracted.
+    /// The passes.
+    pub legs: Vec<Leg>,
+    /// Height of the cutter's centre when it is retracted, mm.
+    pub safe: f64,
+    /// The attack axis then.
     pub retracted: i64,
-    /// Where it says to be, in mm and degrees.
+    /// Where it says to be at each position, in mm and degrees.
     pub stations: Vec<Station>,
     /// mm or degrees in an increment, negative where an axis counts the other way.
     scale: [f64; 3],
@@ -24,17 +28,34 @@ pub struct Placed {
     spots: Vec<Spot>,
 }
 
+/// A pass that was placed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Leg {
+    /// What it is called.
+    pub title: String,
+    /// Feed of its plunge, mm/min.
+    pub feed: f64,
+    /// Its positions.
+    pub positions: Range<usize>,
+}
+
 impl Placed {
-    /// Places a course of at least one position.
+    /// Places passes, of which there is at least one. Retracted, the cutter is the program's clearance above
+    /// their highest position and above `clear`, mm. Angles go on from one pass to the next.
     ///
     /// # Errors
     /// [`Error::TooManyDigits`] for a position that the control's numbers do not hold.
-    pub fn new(course: &[Station], cutter: &Cutter, program: &Program) -> Result<Self> {
+    pub fn new(
+        passes: &[Pass],
+        clear: Option<f64>,
+        cutter: &Cutter,
+        program: &Program,
+    ) -> Result<Self> {
         let tip = match program.point {
             Programmed::Centre => 0.0,
             Programmed::Tip => cutter.max_radius(),
         };
-        let scale = std::array::from_fn(|axis| {
+        let scale: [f64; 3] = std::array::from_fn(|axis| {
             let unit = match MachineAxis::ALL[axis] {
                 MachineAxis::Travel | MachineAxis::Attack => program.units.length(),
                 MachineAxis::Rotation => 1.0,
@@ -48,29 +69,53 @@ impl Placed {
         });
         let shift = [0.0, -tip, 0.0];
         let said = |axis: usize, value: f64| ((value + shift[axis]) / scale[axis]).round() as i64;
-        let place = |s: &Station| std::array::from_fn(|axis| said(axis, s.axes[axis]));
-        let increments: Vec<[i64; 3]> = course.iter().map(place).collect();
-        let highest = course.iter().map(|s| s.axes[1]).fold(f64::MIN, f64::max);
-        let meant = |s: &Station, place: &[i64; 3]| Station {
-            axes: std::array::from_fn(|axis| place[axis] as f64 * scale[axis] - shift[axis]),
-            ..*s
-        };
-        let stations = course.iter().zip(&increments);
-        let placed = Self {
-            stations: stations.map(|(s, place)| meant(s, place)).collect(),
-            increments,
-            retracted: said(1, highest + program.clearance),
+        let stations = passes.iter().flat_map(|p| p.course);
+        let highest = stations.map(|s| s.axes[1]).chain(clear);
+        let safe = highest.fold(f64::MIN, f64::max) + program.clearance;
+        let mut placed = Self {
+            increments: Vec::new(),
+            legs: Vec::new(),
+            safe,
+            retracted: said(1, safe),
+            stations: Vec::new(),
             scale,
-            spots: course
-                .iter()
-                .map(|s| Spot {
-                    x: s.axes[0],
-                    angle: s.axes[2],
-                })
-                .collect(),
+            spots: Vec::new(),
         };
+        let mut turned = 0.0;
+        for pass in passes {
+            let first = placed.increments.len();
+            for station in pass.course {
+                let [x, y, angle] = station.axes;
+                let axes = [x, y, turned + angle];
+                let place: [i64; 3] = std::array::from_fn(|axis| said(axis, axes[axis]));
+                placed.increments.push(place);
+                placed.stations.push(Station {
+                    axes: std::array::from_fn(|axis| {
+                        place[axis] as f64 * scale[axis] - shift[axis]
+                    }),
+                    ..*station
+                });
+                placed.spots.push(Spot { x, angle });
+            }
+            placed.legs.push(Leg {
+                title: pass.title.to_owned(),
+                feed: pass.feed,
+                positions: first..placed.increments.len(),
+            });
+            let last = pass.course.last().map_or(0.0, |s| s.axes[2]);
+            turned += 360.0 * (last / 360.0).ceil();
+        }
         placed.check_digits(program)?;
         Ok(placed)
+    }
+
+    /// The passes as the program says them.
+    pub fn passes(&self) -> impl Iterator<Item = Pass<'_>> {
+        self.legs.iter().map(|leg| Pass {
+            title: &leg.title,
+            course: &self.stations[leg.positions.clone()],
+            feed: leg.feed,
+        })
     }
 
     /// Where position `index` is, for messages.
@@ -90,10 +135,20 @@ impl Placed {
             (Angles::Unwound, _) | (Angles::Rezero, None) => 3,
             (Angles::Modulo, _) | (Angles::Rezero, Some(_)) => 2,
         };
-        let too_large =
-            |place: &[i64; 3]| place[..axes].iter().position(|v| v.abs() > dialect.most);
-        let found = self.increments.iter().enumerate();
-        let mut found = found.filter_map(|(i, place)| Some((i, too_large(place)?)));
+        let turn = program.turn();
+        let mut found = self.legs.iter().flat_map(|leg| {
+            let [.., behind] = self.increments[leg.positions.start];
+            let behind = match program.angles {
+                Angles::Rezero => behind / turn * turn,
+                Angles::Unwound | Angles::Modulo => 0,
+            };
+            leg.positions.clone().filter_map(move |i| {
+                let [x, y, a] = self.increments[i];
+                let place = [x, y, a - behind];
+                let mut place = place[..axes].iter();
+                Some((i, place.position(|v| v.abs() > dialect.most)?))
+            })
+        });
         let Some((index, axis)) = found.next() else {
             return Ok(());
         };

@@ -6,7 +6,7 @@ use horma_core::MachineAxis;
 
 use super::dialect::{Counted, Dialect, Direction, Inverse};
 use super::lines::Lines;
-use super::placed::Placed;
+use super::placed::{Leg, Placed};
 use super::{Angles, FeedMode, Heading, Program, Programmed, Split, Units};
 use crate::error::{Error, Result};
 
@@ -16,8 +16,10 @@ const BLEND: f64 = 0.01;
 /// Text that is gathered before it is handed on, in bytes.
 const CHUNK: usize = 1 << 16;
 
-/// Longer than the longest move with what ends a file after it, in bytes.
+/// Longer than the longest move with what ends a file after it, in bytes, and with what begins a pass before
+/// it.
 const ENDING: u64 = 400;
+const PASS: u64 = 1000;
 
 const TRAVEL: usize = MachineAxis::Travel as usize;
 const ATTACK: usize = MachineAxis::Attack as usize;
@@ -26,7 +28,8 @@ const ROTATION: usize = MachineAxis::Rotation as usize;
 /// All that goes into a program.
 pub(super) struct Script<'a> {
     pub(super) placed: &'a Placed,
-    pub(super) durations: &'a [f64],
+    /// Of each pass.
+    pub(super) durations: &'a [Vec<f64>],
     pub(super) program: &'a Program,
     pub(super) dialect: &'static Dialect,
     pub(super) heading: &'a Heading<'a>,
@@ -38,83 +41,116 @@ impl Script<'_> {
     /// # Errors
     /// [`Error::NoFeed`]
     pub(super) fn check(&self) -> Result<()> {
-        let moves = 1..self.placed.increments.len();
-        match moves.into_iter().find(|&to| self.feed(to) == Some(0.0)) {
+        let passes = self.placed.legs.iter().zip(self.durations);
+        let mut moves = passes.flat_map(|(leg, durations)| {
+            let ends = leg.positions.clone().skip(1);
+            ends.zip(durations)
+        });
+        match moves.find(|(to, seconds)| self.feed(*to, **seconds) == Some(0.0)) {
             None => Ok(()),
-            Some(to) => Err(Error::NoFeed {
+            Some((to, _)) => Err(Error::NoFeed {
                 spot: self.placed.spot(to - 1),
             }),
         }
     }
 
-    /// Writes file number `part`, from position `first`; the position at which it ends.
+    /// Writes file number `part`, from position `first`; the position at which the next one begins.
     pub(super) fn write(&self, first: usize, part: u32, out: &mut impl Write) -> io::Result<usize> {
-        let Self {
-            program, dialect, ..
-        } = self;
-        let increments = &self.placed.increments;
-        let turns = self.turns_behind(first);
-        let mut lines = Lines::new(dialect, program.block_numbers);
+        let mut lines = Lines::new(self.dialect, self.program.block_numbers);
         self.open(&mut lines, part, first);
-
-        self.retract(&mut lines);
-        lines.begin("G0");
-        self.word(&mut lines, TRAVEL, increments[first][TRAVEL]);
-        self.turn(&mut lines, increments[first][ROTATION] - turns);
-        lines.end();
-        lines.begin("G1");
-        self.word(&mut lines, ATTACK, increments[first][ATTACK]);
-        lines.feed(program.feed / program.units.length(), f64::INFINITY);
-        lines.end();
-        self.begin_feed(&mut lines);
-
-        let (mut written, mut last) = (0, first);
-        while last + 1 < increments.len() {
-            if self.full(first, last, written + lines.text.len() as u64) {
+        let (mut at, mut moves, mut written) = (first, 0, 0);
+        let passes = self.placed.legs.iter().zip(self.durations);
+        for (leg, durations) in passes.filter(|(leg, _)| leg.positions.end > first) {
+            let size = written + lines.text.len() as u64;
+            if at > first && self.full(moves, size + PASS) {
                 break;
             }
-            last += 1;
-            let [travel, attack, rotation] = increments[last];
-            lines.begin("G1");
-            self.word(&mut lines, TRAVEL, travel);
-            self.word(&mut lines, ATTACK, attack);
-            self.turn(&mut lines, rotation - turns);
-            match (self.feed(last), program.feed_mode, dialect.inverse) {
-                (Some(feed), _, _) => lines.feed(feed, f64::INFINITY),
-                (None, _, Inverse::PerMinute) => {
-                    lines.feed(60.0 / self.durations[last - 1], dialect.most_inverse);
+            if self.placed.legs.len() > 1 {
+                lines.comment(&format!("pass: {}", leg.title));
+            }
+            if at == first {
+                self.retract(&mut lines);
+            }
+            let turns = self.turns_behind(at);
+            self.approach(&mut lines, leg, at, turns);
+            self.begin_feed(&mut lines);
+            while at + 1 < leg.positions.end {
+                let size = written + lines.text.len() as u64;
+                if moves > 0 && (self.full(moves, size) || self.overflows(at + 1, turns)) {
+                    break;
                 }
-                (None, _, Inverse::Seconds) => lines.seconds(self.durations[last - 1]),
+                at += 1;
+                moves += 1;
+                self.cut(
+                    &mut lines,
+                    at,
+                    turns,
+                    durations[at - leg.positions.start - 1],
+                );
+                if lines.text.len() >= CHUNK {
+                    out.write_all(&lines.text)?;
+                    written += lines.text.len() as u64;
+                    lines.text.clear();
+                }
             }
-            lines.end();
-            if lines.text.len() >= CHUNK {
-                out.write_all(&lines.text)?;
-                written += lines.text.len() as u64;
-                lines.text.clear();
+            self.end_feed(&mut lines);
+            self.retract(&mut lines);
+            self.rezero(&mut lines, self.placed.increments[at][ROTATION]);
+            if at + 1 < leg.positions.end {
+                break;
             }
+            at = leg.positions.end;
         }
-
-        self.end_feed(&mut lines);
-        self.retract(&mut lines);
-        self.rezero(&mut lines, increments[last][ROTATION]);
-        for line in dialect.end {
+        for line in self.dialect.end {
             self.ending(&mut lines, line);
         }
         out.write_all(&lines.text)?;
-        Ok(last)
+        Ok(at)
     }
 
-    /// Whether a file from position `first` to `last`, of so many bytes, takes no more. One move it always
-    /// takes.
-    fn full(&self, first: usize, last: usize, bytes: u64) -> bool {
-        let turned = self.placed.increments[last + 1][ROTATION] - self.turns_behind(first);
-        let counted = match self.program.split {
-            None => return false,
-            Some(Split::Moves(most)) => (last - first) as u64 >= most,
+    /// The way from where the cutter is retracted to position `at`, and down.
+    fn approach(&self, lines: &mut Lines, leg: &Leg, at: usize, turns: i64) {
+        let [travel, attack, rotation] = self.placed.increments[at];
+        lines.begin("G0");
+        self.word(lines, TRAVEL, travel);
+        self.turn(lines, rotation - turns);
+        lines.end();
+        lines.begin("G1");
+        self.word(lines, ATTACK, attack);
+        lines.feed(leg.feed / self.program.units.length(), f64::INFINITY);
+        lines.end();
+    }
+
+    /// The move to position `to`, in so many seconds.
+    fn cut(&self, lines: &mut Lines, to: usize, turns: i64, seconds: f64) {
+        let [travel, attack, rotation] = self.placed.increments[to];
+        lines.begin("G1");
+        self.word(lines, TRAVEL, travel);
+        self.word(lines, ATTACK, attack);
+        self.turn(lines, rotation - turns);
+        match (self.feed(to, seconds), self.dialect.inverse) {
+            (Some(feed), _) => lines.feed(feed, f64::INFINITY),
+            (None, Inverse::PerMinute) => lines.feed(60.0 / seconds, self.dialect.most_inverse),
+            (None, Inverse::Seconds) => lines.seconds(seconds),
+        }
+        lines.end();
+    }
+
+    /// Whether a file of so many moves and bytes takes no more.
+    fn full(&self, moves: u64, bytes: u64) -> bool {
+        match self.program.split {
+            None => false,
+            Some(Split::Moves(most)) => moves >= most,
             Some(Split::Bytes(most)) => bytes + ENDING > most,
-        };
-        let overflows = self.program.angles == Angles::Rezero && turned.abs() > self.dialect.most;
-        last > first && (counted || overflows)
+        }
+    }
+
+    /// Whether position `to` is too far turned for the control, and another file could begin before it.
+    fn overflows(&self, to: usize, turns: i64) -> bool {
+        let turned = self.placed.increments[to][ROTATION] - turns;
+        self.program.split.is_some()
+            && self.program.angles == Angles::Rezero
+            && turned.abs() > self.dialect.most
     }
 
     fn open(&self, lines: &mut Lines, part: u32, first: usize) {
@@ -248,7 +284,7 @@ impl Script<'_> {
     fn rezero(&self, lines: &mut Lines, rotation: i64) {
         if self.program.angles == Angles::Rezero {
             lines.begin("G92");
-            self.word(lines, ROTATION, rotation % self.turn_of());
+            self.word(lines, ROTATION, rotation % self.program.turn());
             lines.end();
         }
     }
@@ -276,7 +312,7 @@ impl Script<'_> {
         else {
             return self.word(lines, ROTATION, rotation);
         };
-        let (turn, word) = (self.turn_of(), self.program.words[ROTATION]);
+        let (turn, word) = (self.program.turn(), self.program.words[ROTATION]);
         let within = rotation.rem_euclid(turn);
         let decimals = self.program.decimals[ROTATION];
         match modulo.direction {
@@ -293,24 +329,20 @@ impl Script<'_> {
         }
     }
 
-    /// A turn, in increments.
-    fn turn_of(&self) -> i64 {
-        360 * 10_i64.pow(u32::from(self.program.decimals[ROTATION]))
-    }
-
-    /// The whole turns that are not counted in a file that begins at position `first`.
+    /// The whole turns that are not counted after a retract, from position `first` on.
     fn turns_behind(&self, first: usize) -> i64 {
         match self.program.angles {
             Angles::Unwound | Angles::Modulo => 0,
             Angles::Rezero => {
-                let turn = self.turn_of();
+                let turn = self.program.turn();
                 self.placed.increments[first][ROTATION] / turn * turn
             }
         }
     }
 
-    /// F of the move to position `to`, in units or degrees a minute; `None` where it tells the time.
-    fn feed(&self, to: usize) -> Option<f64> {
+    /// F of the move to position `to` in so many seconds, in units or degrees a minute; `None` where it tells
+    /// the time.
+    fn feed(&self, to: usize, seconds: f64) -> Option<f64> {
         let [from, to_] = [to - 1, to].map(|i| self.placed.increments[i]);
         let way = |axis: usize| {
             let decimals = i32::from(self.program.decimals[axis]);
@@ -326,7 +358,7 @@ impl Script<'_> {
                 length => length,
             },
         };
-        Some(60.0 * counted / self.durations[to - 1])
+        Some(60.0 * counted / seconds)
     }
 }
 

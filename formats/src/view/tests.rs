@@ -44,6 +44,8 @@ fn report() -> Report {
         path: PathStatistics::of(&path(), &record.counters),
         verification: None,
         program: None,
+        keep_outs: Vec::new(),
+        roughing: None,
         last: None,
         record,
     }

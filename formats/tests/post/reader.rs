@@ -222,17 +222,20 @@ impl Move {
     }
 }
 
-/// That the files are one path, each safe by itself; its moves, without the way there.
+/// That the files are these passes one after the other, each file and each pass safe by itself; the moves of
+/// each pass, without the way there.
 pub fn check(
     files: &[Vec<Move>],
-    course: &[Station],
+    courses: &[Vec<Station>],
     rounding: [f64; 3],
     clearance: f64,
-) -> Result<Vec<Move>, String> {
-    let highest = course.iter().map(|s| s.axes[1]).fold(f64::MIN, f64::max);
+    clear: Option<f64>,
+) -> Result<Vec<Vec<Move>>, String> {
+    let heights = courses.iter().flatten().map(|s| s.axes[1]);
+    let highest = heights.chain(clear).fold(f64::MIN, f64::max);
     let same = |found: [f64; 3], station: &Station| {
         let turned = found[2] - station.axes[2];
-        // A file may begin at any turn.
+        // A pass, and a file, may begin at any turn.
         let offset = 360.0 * (turned / 360.0).round();
         let near = |axis: usize, shift: f64| {
             let off = found[axis] - shift - station.axes[axis];
@@ -240,50 +243,71 @@ pub fn check(
         };
         (near(0, 0.0) && near(1, 0.0) && near(2, offset)).then_some(offset)
     };
-    let mut at = 0;
-    let mut all = Vec::new();
+    let safe = |m: &Move| {
+        m.rapid
+            && m.named == [false, true, false]
+            && m.to[1] >= highest + clearance - rounding[1] * 1.001
+    };
+    let mut all: Vec<Vec<Move>> = courses.iter().map(|_| Vec::new()).collect();
+    // The pass, and the position in it.
+    let (mut pass, mut at) = (0, 0);
     for (n, moves) in files.iter().enumerate() {
-        let [retract, travel, plunge, cuts @ .., back] = &moves[..] else {
-            return Err(format!("file {n} has only {} moves", moves.len()));
+        let [retract, rest @ ..] = &moves[..] else {
+            return Err(format!("file {n} has no moves"));
         };
-        let safe = |m: &Move| {
-            m.rapid
-                && m.named == [false, true, false]
-                && m.to[1] >= highest + clearance - rounding[1] * 1.001
-        };
-        if !safe(retract) || !safe(back) {
-            return Err(format!(
-                "file {n} retracts {retract:?} and {back:?}, over {highest}"
-            ));
+        if !safe(retract) || rest.is_empty() {
+            return Err(format!("file {n} retracts {retract:?}, over {highest}"));
         }
-        if !travel.rapid || travel.named != [true, false, true] {
-            return Err(format!("file {n} travels {travel:?}"));
-        }
-        if plunge.rapid || plunge.named != [false, true, false] {
-            return Err(format!("file {n} plunges {plunge:?}"));
-        }
-        let begin = same(plunge.to, &course[at]);
-        if begin.is_none() {
-            return Err(format!(
-                "file {n} begins at {plunge:?}, not at {:?}",
-                course[at]
-            ));
-        }
-        for cut in cuts {
-            at += 1;
-            let station = course
-                .get(at)
-                .ok_or("there are more moves than positions")?;
-            if cut.rapid || same(cut.to, station) != begin {
+        let (mut rest, mut before) = (rest, None::<&Move>);
+        while !rest.is_empty() {
+            let course = courses
+                .get(pass)
+                .ok_or("there are more passes than courses")?;
+            let end = rest.iter().position(safe);
+            let end = end.ok_or_else(|| format!("file {n} does not retract over {highest}"))?;
+            let [travel, plunge, cuts @ ..] = &rest[..end] else {
+                return Err(format!("file {n} retracts at once"));
+            };
+            if !travel.rapid || travel.named != [true, false, true] {
+                return Err(format!("file {n} travels {travel:?}"));
+            }
+            let unwound = before.map_or(0.0, |back| (travel.to[2] - back.to[2]).abs());
+            if unwound > 360.0 + 1e-6 {
+                return Err(format!("file {n} turns by {unwound} between passes"));
+            }
+            if plunge.rapid || plunge.named != [false, true, false] {
+                return Err(format!("file {n} plunges {plunge:?}"));
+            }
+            let begin = same(plunge.to, &course[at]);
+            if begin.is_none() {
                 return Err(format!(
-                    "position {at} is {station:?}, but the move {cut:?}"
+                    "file {n} begins at {plunge:?}, not at {:?}",
+                    course[at]
                 ));
             }
-            all.push(cut.clone());
+            for cut in cuts {
+                at += 1;
+                let station = course
+                    .get(at)
+                    .ok_or("there are more moves than positions")?;
+                if cut.rapid || same(cut.to, station) != begin {
+                    return Err(format!(
+                        "position {at} is {station:?}, but the move {cut:?}"
+                    ));
+                }
+                all[pass].push(cut.clone());
+            }
+            before = Some(&rest[end]);
+            rest = &rest[end + 1..];
+            if at + 1 == course.len() {
+                (pass, at) = (pass + 1, 0);
+            } else if !rest.is_empty() {
+                return Err(format!("file {n} leaves pass {pass} at position {at}"));
+            }
         }
     }
-    if at + 1 != course.len() {
-        return Err(format!("{at} moves to {} positions", course.len()));
+    if pass != courses.len() {
+        return Err(format!("pass {pass} ends at position {at}"));
     }
     Ok(all)
 }

@@ -105,14 +105,19 @@ function attemptsTable(title, attempts) {
   return table(title, ["extent", "attempt", "by", "reason"], rows, "broad");
 }
 
-function programTables({ dialect, files, seconds: time, bounds, peaks, steady }) {
+function passesTable(passes) {
+  const rows = passes.map((p) => [p.name, p.path, whole(p.positions), mm(p.length, 0), seconds(p.seconds), mm(p.deepest_cut)]);
+  return table("Passes", ["pass", "path", "positions", "length", "time", "deepest cut"], rows, "broad");
+}
+
+function programTables({ dialect, files, passes, seconds: time, bounds, peaks, steady }) {
   const unit = (axis) => (axis === "rotation" ? "°" : "mm");
   const asked = peaks.map(({ axis, velocity, acceleration, jerk }) => [axis,
     `${rough(velocity)} ${unit(axis)}/s`, `${rough(acceleration)} ${unit(axis)}/s²`, `${rough(jerk)} ${unit(axis)}/s³`]);
   const pairs = [["dialect", dialect], ["files", files.join(", ")], ["time at work", seconds(time)],
     ...bounds.map(([name, share]) => [`moves held by ${name}`, percent(share)])];
   if (steady) pairs.push(["steady spindle within the same limits", `${rough(steady.turns)} turns a minute`], ["time at that", seconds(steady.seconds)]);
-  return [table("Program", [], pairs), table("Asked of each axis at most", ["axis", "velocity", "acceleration", "jerk"], asked, "broad")];
+  return [table("Program", [], pairs), ...(passes?.length ? [passesTable(passes)] : []), table("Asked of each axis at most", ["axis", "velocity", "acceleration", "jerk"], asked, "broad")];
 }
 
 /// Whatever has no table of its own: names and values, those of what lies within after their names.
