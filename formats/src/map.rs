@@ -11,7 +11,7 @@ use base64::engine::general_purpose::STANDARD;
 use horma_core::Machined;
 
 use crate::error::Result;
-use crate::svg::{self, line, push, text};
+use crate::svg::{self, line, push, text, ticks_between};
 use crate::{output, raster};
 
 /// Colours for deviations, as on a run's page: red where gouged, white where nothing is the matter, blue where
@@ -163,19 +163,6 @@ fn picture(size: (u32, u32), colour: impl Fn(u32, u32) -> [u8; 3]) -> Vec<u8> {
     raster::png(&pixels, size).expect("a picture of this size can be encoded in memory")
 }
 
-/// A few round numbers in an interval.
-fn ticks_between(low: f64, high: f64) -> Vec<f64> {
-    let rough = (high - low) / 8.0;
-    let decade = 10.0_f64.powf(rough.log10().floor());
-    let round = [1.0, 2.0, 5.0, 10.0].map(|k| k * decade);
-    let step = round.into_iter().find(|&s| s >= rough).unwrap_or(rough);
-    let first = (low / step).ceil() as i64;
-    let last = (high / step).floor() as i64;
-    // Back and forth, so that 0.3 does not show as 0.30000000000000004.
-    let tick = |k: i64| (k as f64 * step * 1.0e9).round() / 1.0e9;
-    (first..=last).map(tick).collect()
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
@@ -226,14 +213,5 @@ pub(crate) mod tests {
         assert_eq!(pixel(1, 6), [192, 31, 46]);
         assert_eq!(pixel(2, 0), MISSING);
         assert_eq!(pixels.iter().filter(|&&p| p == 247).count(), 3 * 22);
-    }
-
-    #[test]
-    fn ticks_are_round_and_few() {
-        assert_eq!(ticks_between(-3.0, 247.0), [0.0, 50.0, 100.0, 150.0, 200.0]);
-        assert_eq!(
-            ticks_between(0.0, 0.8),
-            [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]
-        );
     }
 }

@@ -1,8 +1,8 @@
-//! Diagrams out: curves over two logarithmic axes, as SVG.
+//! Diagrams out: curves over two axes, each even or logarithmic, as SVG.
 //!
 //! Nothing is computed about the curves.
 
-use crate::svg::{self, escaped, line, push, text};
+use crate::svg::{self, escaped, line, push, text, ticks_between};
 
 /// A diagram.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,8 +15,19 @@ pub struct Plot {
     pub x: String,
     /// What the vertical axis measures, with its unit.
     pub y: String,
+    /// How each of the two is divided.
+    pub scales: [Scale; 2],
     /// The curves, in the order of the legend.
     pub curves: Vec<Curve>,
+}
+
+/// How an axis is divided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// Equal lengths for equal differences.
+    Even,
+    /// Equal lengths for equal ratios; only positive values can be shown.
+    Logarithmic,
 }
 
 /// A curve.
@@ -28,12 +39,15 @@ pub struct Curve {
     pub color: usize,
     /// Whether the line is broken.
     pub dashed: bool,
-    /// Points, from left to right; only positive ones can be shown.
+    /// Points, from left to right; with a mark at each if there are few.
     pub points: Vec<[f64; 2]>,
 }
 
 /// Number of colours that a curve can have.
 pub const COLORS: usize = 4;
+
+/// Most points of a curve that has a mark at each.
+const MARKED: usize = 40;
 
 /// Size of the picture, and the frame in it: left, top, right, bottom.
 const SIZE: [f64; 2] = [720.0, 480.0];
@@ -56,22 +70,22 @@ pub fn svg(plot: &Plot) -> String {
     text(&mut out, "title", "start", [left, 32.0], &plot.title);
     text(&mut out, "minor", "start", [left, 53.0], &plot.subtitle);
     let values = |k: usize| {
+        let scale = plot.scales[k];
         let points = plot.curves.iter().flat_map(|c| &c.points);
-        points.map(move |p| p[k]).filter(|v| shown(*v))
+        points.map(move |p| p[k]).filter(move |v| scale.shows(*v))
     };
-    let x = Axis::over(values(0), [left, right]);
-    let y = Axis::over(values(1), [bottom, top]);
-    for tick in &x.ticks {
-        let at = x.at(tick.exponent());
+    let [x_scale, y_scale] = plot.scales;
+    let x = Axis::over(x_scale, values(0), [left, right]);
+    let y = Axis::over(y_scale, values(1), [bottom, top]);
+    for (place, label) in &x.ticks {
+        let at = x.at(*place);
         line(&mut out, "grid", [at, top], [at, bottom]);
-        let label = tick.label();
-        text(&mut out, "minor", "middle", [at, bottom + 20.0], &label);
+        text(&mut out, "minor", "middle", [at, bottom + 20.0], label);
     }
-    for tick in &y.ticks {
-        let at = y.at(tick.exponent());
+    for (place, label) in &y.ticks {
+        let at = y.at(*place);
         line(&mut out, "grid", [left, at], [right, at]);
-        let label = tick.label();
-        text(&mut out, "minor", "end", [left - 8.0, at + 4.5], &label);
+        text(&mut out, "minor", "end", [left - 8.0, at + 4.5], label);
     }
     svg::frame(&mut out, FRAME);
     let middle = [(left + right) / 2.0, (top + bottom) / 2.0];
@@ -86,7 +100,8 @@ pub fn svg(plot: &Plot) -> String {
     );
     legend(&mut out, plot);
     for curve in &plot.curves {
-        let shown = curve.points.iter().filter(|p| p.iter().all(|v| shown(*v)));
+        let points = curve.points.iter();
+        let shown = points.filter(|p| x_scale.shows(p[0]) && y_scale.shows(p[1]));
         let places: Vec<[f64; 2]> = shown.map(|p| [x.place(p[0]), y.place(p[1])]).collect();
         draw(&mut out, curve, &places);
     }
@@ -94,23 +109,54 @@ pub fn svg(plot: &Plot) -> String {
     out
 }
 
-/// Whether a logarithmic axis can show it.
-fn shown(value: f64) -> bool {
-    value > 0.0 && value.is_finite()
+impl Scale {
+    /// Whether it can show a value.
+    fn shows(self, value: f64) -> bool {
+        value.is_finite() && (self == Self::Even || value > 0.0)
+    }
+
+    /// Where equal lengths are equal differences.
+    fn place(self, value: f64) -> f64 {
+        match self {
+            Self::Even => value,
+            Self::Logarithmic => value.log10(),
+        }
+    }
 }
 
-/// A logarithmic axis, from tick to tick.
+/// An axis: its labels by their places, and which places its ends are.
 struct Axis {
-    ticks: Vec<Tick>,
+    scale: Scale,
+    ticks: Vec<(f64, String)>,
+    span: [f64; 2],
     ends: [f64; 2],
 }
 
 impl Axis {
-    fn over(values: impl Iterator<Item = f64>, ends: [f64; 2]) -> Self {
+    fn over(scale: Scale, values: impl Iterator<Item = f64>, ends: [f64; 2]) -> Self {
         let span = values.fold(None, |span: Option<(f64, f64)>, v| {
             Some(span.map_or((v, v), |(low, high)| (low.min(v), high.max(v))))
         });
-        let (low, high) = span.unwrap_or((1.0, 10.0));
+        match scale {
+            Scale::Even => Self::even(span.unwrap_or((0.0, 1.0)), ends),
+            Scale::Logarithmic => Self::logarithmic(span.unwrap_or((1.0, 10.0)), ends),
+        }
+    }
+
+    /// From end to end of what is shown.
+    fn even((low, high): (f64, f64), ends: [f64; 2]) -> Self {
+        let high = if high > low { high } else { low + 1.0 };
+        let ticks = ticks_between(low, high);
+        Self {
+            scale: Scale::Even,
+            ticks: ticks.into_iter().map(|t| (t, t.to_string())).collect(),
+            span: [low, high],
+            ends,
+        }
+    }
+
+    /// From tick to tick.
+    fn logarithmic((low, high): (f64, f64), ends: [f64; 2]) -> Self {
         // A hair beyond a tick does not ask for another one.
         let (low, high) = (low.log10() + 0.02, high.log10() - 0.02);
         let first = low.floor() as i32;
@@ -125,22 +171,30 @@ impl Axis {
         while ticks.len() > 2 && ticks[ticks.len() - 2].exponent() >= high {
             ticks.pop();
         }
-        Self { ticks, ends }
+        let end = |tick: Option<&Tick>| tick.map_or(0.0, |t| t.exponent());
+        Self {
+            scale: Scale::Logarithmic,
+            span: [end(ticks.first()), end(ticks.last())],
+            ticks: ticks
+                .into_iter()
+                .map(|t| (t.exponent(), t.label()))
+                .collect(),
+            ends,
+        }
     }
 
     fn place(&self, value: f64) -> f64 {
-        self.at(value.log10())
+        self.at(self.scale.place(value))
     }
 
-    fn at(&self, exponent: f64) -> f64 {
-        let end = |tick: Option<&Tick>| tick.map_or(0.0, |t| t.exponent());
-        let (low, high) = (end(self.ticks.first()), end(self.ticks.last()));
-        let share = (exponent - low) / (high - low);
+    fn at(&self, place: f64) -> f64 {
+        let [low, high] = self.span;
+        let share = (place - low) / (high - low);
         self.ends[0] + (self.ends[1] - self.ends[0]) * share
     }
 }
 
-/// A labelled value of an axis: a digit times a power of ten.
+/// A labelled value of a logarithmic axis: a digit times a power of ten.
 #[derive(Clone, Copy)]
 struct Tick {
     digit: u8,
@@ -199,6 +253,9 @@ fn draw(out: &mut String, curve: &Curve, places: &[[f64; 2]]) {
         out,
         format_args!("<polyline class=\"curve c{color}{dashed}\" points=\"{line}\"/>\n"),
     );
+    if places.len() > MARKED {
+        return;
+    }
     for [x, y] in places {
         push(
             out,
@@ -211,12 +268,13 @@ fn draw(out: &mut String, curve: &Curve, places: &[[f64; 2]]) {
 mod tests {
     use super::*;
 
-    fn plot(points: Vec<[f64; 2]>) -> String {
+    fn plot(scales: [Scale; 2], points: Vec<[f64; 2]>) -> String {
         svg(&Plot {
             title: "a < b & c".to_owned(),
             subtitle: String::new(),
             x: "points".to_owned(),
             y: "µs".to_owned(),
+            scales,
             curves: vec![Curve {
                 name: "exact".to_owned(),
                 color: 1,
@@ -226,10 +284,30 @@ mod tests {
         })
     }
 
+    const LOGARITHMIC: [Scale; 2] = [Scale::Logarithmic; 2];
+
+    #[test]
+    fn an_even_axis_goes_from_end_to_end() {
+        let [left, top, right, bottom] = FRAME;
+        let points: Vec<[f64; 2]> = (0..=50)
+            .map(|k| [f64::from(k), f64::from(k - 25)])
+            .collect();
+        let drawn = plot([Scale::Even; 2], points);
+        let (x, y) = ((left + right) / 2.0, (top + bottom) / 2.0);
+        assert!(
+            drawn.contains(&format!("{left:.1},{bottom:.1} ")),
+            "{drawn}"
+        );
+        assert!(drawn.contains(&format!(" {x:.1},{y:.1} ")), "{drawn}");
+        assert!(drawn.contains(">-20<") && drawn.contains(">40<"), "{drawn}");
+        let marks = drawn.matches("<circle").count();
+        assert_eq!(marks, 2, "those of the legend and no more");
+    }
+
     #[test]
     fn decades_span_the_frame() {
         let [left, top, right, bottom] = FRAME;
-        let drawn = plot(vec![[1.0e4, 0.1], [1.0e5, 1.0], [1.0e6, 10.0]]);
+        let drawn = plot(LOGARITHMIC, vec![[1.0e4, 0.1], [1.0e5, 1.0], [1.0e6, 10.0]]);
         let (x, y) = ((left + right) / 2.0, (top + bottom) / 2.0);
         let line = format!("{left:.1},{bottom:.1} {x:.1},{y:.1} {right:.1},{top:.1}");
         assert!(drawn.contains(&line), "{drawn}");
@@ -247,17 +325,20 @@ mod tests {
             vec![[10.0, 5.0]],
             vec![[0.0, -1.0], [1.0, f64::NAN]],
         ] {
-            let drawn = plot(points);
-            assert!(!drawn.contains("NaN") && !drawn.contains("inf"), "{drawn}");
-            assert!(drawn.ends_with("</svg>\n"));
+            for scales in [LOGARITHMIC, [Scale::Even; 2]] {
+                let drawn = plot(scales, points.clone());
+                assert!(!drawn.contains("NaN") && !drawn.contains("inf"), "{drawn}");
+                assert!(drawn.ends_with("</svg>\n"));
+            }
         }
     }
 
     #[test]
     fn a_short_axis_has_what_lies_between_decades() {
         let labels = |low: f64, high: f64| {
-            let axis = Axis::over([low, high].into_iter(), [0.0, 1.0]);
-            axis.ticks.iter().map(|t| t.label()).collect::<Vec<_>>()
+            let values = [low, high].into_iter();
+            let axis = Axis::over(Scale::Logarithmic, values, [0.0, 1.0]);
+            axis.ticks.into_iter().map(|t| t.1).collect::<Vec<_>>()
         };
         assert_eq!(labels(1.0, 8.0), ["1", "2", "5", "10"]);
         assert_eq!(labels(0.03, 0.3), ["0.02", "0.05", "0.1", "0.2", "0.5"]);

@@ -64,3 +64,30 @@ pub(crate) fn escaped(text: &str) -> String {
         .replace('<', "&lt;")
         .replace('>', "&gt;")
 }
+
+/// A few round numbers in an interval.
+pub(crate) fn ticks_between(low: f64, high: f64) -> Vec<f64> {
+    let rough = (high - low) / 8.0;
+    let decade = 10.0_f64.powf(rough.log10().floor());
+    let round = [1.0, 2.0, 5.0, 10.0].map(|k| k * decade);
+    let step = round.into_iter().find(|&s| s >= rough).unwrap_or(rough);
+    let first = (low / step).ceil() as i64;
+    let last = (high / step).floor() as i64;
+    // Back and forth, so that 0.3 does not show as 0.30000000000000004.
+    let tick = |k: i64| (k as f64 * step * 1.0e9).round() / 1.0e9;
+    (first..=last).map(tick).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_few() {
+        assert_eq!(ticks_between(-3.0, 247.0), [0.0, 50.0, 100.0, 150.0, 200.0]);
+        assert_eq!(
+            ticks_between(0.0, 0.8),
+            [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]
+        );
+    }
+}

@@ -1,6 +1,6 @@
 //! The diagram of a bench: cost per position against density.
 
-use horma_formats::plot::{Curve, Plot};
+use horma_formats::plot::{Curve, Plot, Scale};
 
 use super::figures::{Density, Figures};
 
@@ -24,6 +24,7 @@ pub(super) fn against_density(figures: &Figures) -> Plot {
         ),
         x: "points of the part".to_owned(),
         y: "time per position (µs)".to_owned(),
+        scales: [Scale::Logarithmic; 2],
         curves: vec![
             curve("facets, brute force", 1, true, |d| d.facet.brute_us),
             curve("points, brute force", 0, true, |d| d.point.brute_us),

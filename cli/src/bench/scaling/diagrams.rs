@@ -1,7 +1,7 @@
 //! The figures as diagrams. A colour is a distribution; what is not measured is dashed.
 
 use horma_core::Distribution;
-use horma_formats::plot::{Curve, Plot};
+use horma_formats::plot::{Curve, Plot, Scale};
 
 use super::Experiment;
 use super::model::{Fit, Projection};
@@ -30,6 +30,7 @@ pub(super) fn all(
         subtitle: format!("{}; {} cores", experiment.subject, experiment.cores),
         x: x.to_owned(),
         y: y.to_owned(),
+        scales: [Scale::Logarithmic; 2],
         curves,
     };
     if let Some(fit) = fits.first() {
