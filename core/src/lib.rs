@@ -66,6 +66,8 @@ mod last;
 
 mod record;
 
+mod packed;
+
 pub use course::{MachineAxis, Station, course};
 pub use cutter::Cutter;
 pub use digitize::{Digitizer, Heuristic};
@@ -81,6 +83,7 @@ pub use last::{Choice, Frame, Grading, Hold, Landmark, Landmarks, Last, Measures
 pub use last::{Sections, System, shape};
 pub use layers::{Layer, deepest_cut, layers};
 pub use motion::{Index, Motion, MotionKind, Trajectory};
+pub use packed::{Packing, pack_words, unpack_words};
 pub use part::{Body, Mesh, Part, Shape};
 pub use path::{Inserted, SubTrajectory, ToolPath, Touch, Waypoint, stitch};
 pub use placement::{Axis, place};
