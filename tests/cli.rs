@@ -698,6 +698,58 @@ fn a_bench_of_clusters_tells_what_each_took_and_what_that_projects() {
     );
 }
 
+#[test]
+fn papers_are_reproduced_by_name_beside_other_files() {
+    let dir = scratch();
+    let out = dir.path().join("docs");
+    std::fs::create_dir(&out).expect("ours");
+    let other = file(&out, "other.md", b"mine");
+    let said = succeed(&[
+        "papers",
+        "precision",
+        "multirotator",
+        "-o",
+        text(&out),
+        "-q",
+    ]);
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
+    let (page, view) = (read("papers.md"), read("papers.html"));
+    assert!(
+        said.contains("papers.md") && said.contains("papers.html"),
+        "{said}"
+    );
+    // In their own order, whatever was typed.
+    let [first, second] = ["## The MultiRotator", "## Precision"].map(|h| page.find(h).expect(h));
+    assert!(
+        first < second && !page.contains("## The coprocessor"),
+        "{page}"
+    );
+    assert!(
+        page.contains("horma papers multirotator precision -o docs"),
+        "{page}"
+    );
+    assert!(
+        page.contains("(papers/figure7.svg)") && read("papers/figure7.svg").ends_with("</svg>\n")
+    );
+    assert!(
+        view.contains("<svg") && !view.contains("<img"),
+        "diagrams are in the page"
+    );
+    // What is written anew takes the place of what was there, and of nothing else.
+    succeed(&["papers", "multirotator", "-o", text(&out), "-q"]);
+    assert!(!out.join("papers/figure7.svg").exists());
+    assert_eq!(std::fs::read(&other).expect("there"), b"mine");
+    let unknown = run(&["papers", "abacus", "-o", text(&out)]);
+    let (_, err) = texts(&unknown);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(
+        err.contains("abacus") && err.contains("multirotator"),
+        "{err}"
+    );
+    file(&out, "papers/notes.txt", b"mine");
+    check(&["papers", "-o", text(&out)], 2, &["notes.txt"]);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_run_is_viewed_in_the_browser_that_is_named() {

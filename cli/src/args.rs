@@ -11,6 +11,7 @@ use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use horma_core::{Distribution, Simd};
 use horma_formats::job::Overrides;
+use horma_papers::Experiment;
 
 pub(crate) use self::last::{Made, Measure, Sizes};
 use crate::traces::{self, Collector};
@@ -148,6 +149,17 @@ Exit codes: 0 no check failed, 2 something here is wrong, 4 master and worker do
     /// Measure on this machine what the searches cost, and what clusters gain
     #[command(subcommand)]
     Bench(Bench),
+    /// Reproduce the papers: their hardware models and experiments, beside what is printed in them
+    ///
+    /// Every figure that the papers print stands beside the one found, with a verdict; where the papers are
+    /// wrong the figures say so. All of it takes a minute at most and needs no file.
+    #[command(after_help = "\
+Examples:
+  horma papers -o papers                 everything
+  horma papers cordic precision -o papers
+
+Writes papers.md, papers.html (one file, diagrams and all) and the diagrams of papers.md, papers/*.svg.")]
+    Papers(Papers),
     /// Print shell completions
     Completions {
         /// bash, zsh, fish, elvish or powershell
@@ -583,6 +595,19 @@ position, so it digitizes few of them, see --thin; it is compared with brute for
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct Papers {
+    /// What to reproduce [default: everything]
+    #[arg(value_name = "NAME", value_parser = experiments())]
+    pub names: Vec<Experiment>,
+    /// Directory for papers.md, papers.html and papers/; created if missing. What else is in it stays
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Show nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct BenchScaling {
     /// The job file (TOML) [default: the sample that `horma init` writes]
     #[arg(value_name = "JOB")]
@@ -623,6 +648,14 @@ pub(crate) struct BenchScaling {
     /// Show no progress, only the tables
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+fn experiments() -> impl TypedValueParser<Value = Experiment> {
+    let known = PossibleValuesParser::new(Experiment::ALL.map(Experiment::name));
+    known.try_map(|typed| {
+        let found = Experiment::ALL.into_iter().find(|e| e.name() == typed);
+        found.ok_or("not an experiment")
+    })
 }
 
 fn distributions() -> impl TypedValueParser<Value = Distribution> {

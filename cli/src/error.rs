@@ -10,6 +10,8 @@ pub(crate) enum Error {
     #[error(transparent)]
     Core(#[from] horma_core::Error),
     #[error(transparent)]
+    Papers(horma_papers::Error),
+    #[error(transparent)]
     Master(#[from] horma_master::Error),
     #[error(transparent)]
     Worker(#[from] horma_worker::Error),
@@ -136,6 +138,16 @@ pub(crate) enum Error {
     Interrupted,
 }
 
+impl From<horma_papers::Error> for Error {
+    fn from(error: horma_papers::Error) -> Self {
+        match error {
+            horma_papers::Error::Core(error) => Self::Core(error),
+            horma_papers::Error::Formats(error) => Self::Formats(error),
+            error @ horma_papers::Error::Format { .. } => Self::Papers(error),
+        }
+    }
+}
+
 pub(crate) type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
@@ -145,7 +157,8 @@ impl Error {
             Self::OfSize { source, .. } => source.exit_code(),
             Self::Core(e) => of_core(e),
             Self::Formats(e) if e.is_impossible() => 3,
-            Self::Impossible { .. }
+            Self::Papers(_)
+            | Self::Impossible { .. }
             | Self::Differs { .. }
             | Self::Gouge { .. }
             | Self::MotionGouge { .. }

@@ -25,6 +25,7 @@ mod certs;
 mod doctor;
 mod http;
 mod inspect;
+mod papers;
 mod reach;
 mod serve;
 mod view;
@@ -115,6 +116,7 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Inspect { files } => inspect::inspect(&files),
         Command::Bench(args::Bench::Kernel(bench)) => bench::kernel(&bench),
         Command::Bench(args::Bench::Scaling(bench)) => bench::scaling(&bench),
+        Command::Papers(args) => papers::papers(&args),
         Command::Completions { shell } => {
             args::print_completions(shell);
             Ok(())
