@@ -45,16 +45,16 @@ const TITLE: &str = "The papers, reproduced";
 
 /// What is said before all chapters.
 const INTRODUCTION: [&str; 3] = [
-    "Three papers describe virtual digitizing: Jimeno, García and Salas, *Shoe last machining using Virtual \
-     Digitising* (2001, below: the 2001 paper); Jimeno, Cuenca, Martínez and Sánchez, *Accelerating tool path \
-     computing in turning lathe machining* (the coprocessor paper); Jimeno, Sánchez, Mora, Mora and \
-     García-Chamizo, *FPGA-based tool path computation* (the FPGA paper). What they describe is built here, and \
+    "Three papers describe virtual digitizing: Jimeno, García and Salas, “Shoe last machining using Virtual \
+     Digitising” (2001, below: the 2001 paper); Jimeno, Cuenca, Martínez and Sánchez, “Accelerating tool path \
+     computing in turning lathe machining” (the coprocessor paper); Jimeno, Sánchez, Mora, Mora and \
+     García-Chamizo, “FPGA-based tool path computation” (the FPGA paper). What they describe is built here, and \
      each figure in print stands beside the one found.",
     "The texts at hand have lost their images, and of the FPGA paper all tables and figures: tables 1 to 4 and \
      figures 1 to 11. Where a claim is known only from the sentence about a figure, only the sentence is \
      compared.",
     "Everything is exact and the same on every machine but for what is timed, which differs from run to run. \
-     *Agrees*: the same figure, or the bound in print is kept. *Differs*: it is not. *Fitted*: a model was \
+     “Agrees”: the same figure, or the bound in print is kept. “Differs”: it is not. “Fitted”: a model was \
      fitted to what is printed, so that it proves nothing.",
 ];
 

@@ -292,8 +292,8 @@ fn figure10() -> Plot {
     for (color, model) in models.into_iter().enumerate() {
         let name = format!("{:.0} % rotations", 100.0 * model.share);
         let points = clocks().map(|c| [c, 100.0 * model.time(c)]).collect();
-        curves.push(curve(name.clone(), color, false, points));
-        let name = format!("{name}, in no time");
+        curves.push(curve(name, color, false, points));
+        let name = format!("{:.0} % in no time", 100.0 * model.share);
         curves.push(curve(name, color, true, flat(100.0 * (1.0 - model.share))));
     }
     curves.push(curve("without hardware".to_owned(), 3, false, flat(100.0)));
