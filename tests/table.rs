@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use common::{data, job, path_of, report, run, sample, scratch, text, texts};
 use horma_core::{Axis, Discretization, discretize, place};
+use horma_formats::part;
 use serde_json::Value;
 
 const WORKERS: [usize; 6] = [1, 2, 3, 5, 8, 16];
@@ -90,8 +91,8 @@ fn widest(report: &Value) -> f64 {
 /// A scan of the sample: its facets, in no order and without their surfaces, in a binary STL.
 fn scan_of_the_sample(dir: &Path) -> PathBuf {
     let files = [sample().with_file_name("last.step")];
-    let (part, _) = horma_formats::part::read_all(&files).expect("the sample");
-    let part = place(part, Axis::default()).expect("placed");
+    let read = part::read_all(&files, &part::Reading::default()).expect("the sample");
+    let part = place(read.part, Axis::default()).expect("placed");
     let grid = Discretization::Grid {
         rows: 60,
         columns: 40,

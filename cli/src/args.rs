@@ -11,6 +11,7 @@ use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use horma_core::{Distribution, Simd};
 use horma_formats::job::Overrides;
+use horma_formats::part::{UNIT_NAMES, Unit};
 use horma_papers::Experiment;
 
 pub(crate) use self::last::{Made, Measure, Sizes};
@@ -142,9 +143,13 @@ Exit codes: 0 no check failed, 2 something here is wrong, 4 master and worker do
     },
     /// Tell what is in part files
     Inspect {
-        /// STEP, STL or OBJ files
+        /// STEP, IGES, STL, OBJ, PLY or 3MF files
         #[arg(required = true)]
         files: Vec<PathBuf>,
+        /// The unit of length of files that state none: mm, cm, m, um, inch, ft or mil; default mm.
+        /// In a job: units in its section part
+        #[arg(long, value_name = "UNIT", value_parser = unit)]
+        units: Option<Unit>,
     },
     /// Measure on this machine what the searches cost, and what clusters gain
     #[command(subcommand)]
@@ -684,6 +689,10 @@ impl fmt::Display for Search {
             Self::Brute => "brute",
         })
     }
+}
+
+fn unit(text: &str) -> Result<Unit, String> {
+    Unit::named(text).ok_or_else(|| format!("known: {UNIT_NAMES}"))
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
+use horma_formats::part::Unit;
 use horma_formats::{inspect, sample};
 
 use crate::error::Result;
 use crate::say;
 
 /// Tells what is in each file.
-pub(crate) fn inspect(files: &[PathBuf]) -> Result<()> {
+pub(crate) fn inspect(files: &[PathBuf], units: Option<&Unit>) -> Result<()> {
     for file in files {
-        say(&inspect::inspect(file)?.to_string());
+        say(&inspect::inspect(file, units.cloned())?.to_string());
     }
     Ok(())
 }

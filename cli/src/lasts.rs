@@ -6,9 +6,10 @@ use horma_core::{
     Discretization, Frame, Interval, Last, Machined, Outline, Part, Position, Rays, Shaped, Simd,
     discretize, place, shape,
 };
+use horma_formats::csv;
 use horma_formats::job::{JobFile, Side};
 use horma_formats::lasts::{Lasts, figure};
-use horma_formats::{csv, part};
+use horma_formats::part::{self, Reading};
 
 use crate::args;
 use crate::error::{Error, Result};
@@ -93,7 +94,7 @@ pub(crate) fn measure(args: &args::Measure) -> Result<()> {
             if args.path.is_some() || args.made.size.is_some() || args.made.side.is_some() {
                 return Err(Error::MeasureNeedsJob);
             }
-            let (part, _) = part::read_all(files)?;
+            let part = part::read_all(files, &Reading::default())?.part;
             let last = Last {
                 bodies: Vec::new(),
                 frame: Frame::new(true, [0.0, 0.0, 1.0], true)?,

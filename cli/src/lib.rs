@@ -113,7 +113,7 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Doctor(args) => doctor::doctor(&args),
         Command::Certs(certs) => certs::certs(&certs),
         Command::Init { directory } => inspect::init(&directory),
-        Command::Inspect { files } => inspect::inspect(&files),
+        Command::Inspect { files, units } => inspect::inspect(&files, units.as_ref()),
         Command::Bench(args::Bench::Kernel(bench)) => bench::kernel(&bench),
         Command::Bench(args::Bench::Scaling(bench)) => bench::scaling(&bench),
         Command::Papers(args) => papers::papers(&args),

@@ -12,8 +12,9 @@ use horma_core::{
 };
 use horma_formats::job::{self, JobFile, Overrides};
 use horma_formats::output::Staging;
+use horma_formats::part::{self, Assembled, Source};
 use horma_formats::report::{self, Left, PathStatistics, Report, RoughStatistics};
-use horma_formats::{csv, output, part, preview, view};
+use horma_formats::{csv, output, preview, view};
 use horma_master::{Outcome, Progress};
 use horma_proto::{VERSION, trace};
 use tokio::runtime::Runtime;
@@ -174,6 +175,7 @@ fn fetch_alone(remote: &Remote, id: u64, wait: bool, output: &Path, quiet: bool)
     let report = Report {
         version: VERSION.to_owned(),
         job: serde_json::Value::Null,
+        files: Vec::new(),
         warnings: vec![UNKNOWN.to_owned()],
         path: PathStatistics::of(&path, &record.counters),
         verification: None,
@@ -243,6 +245,8 @@ pub(crate) struct Prepared {
     pub file: JobFile,
     /// The job as it is said, for the report: what is made of its last is not made of that again.
     pub job: serde_json::Value,
+    /// Where the part comes from.
+    pub sources: Vec<Source>,
     /// What there is to warn of.
     pub warnings: Vec<String>,
     /// The last in it, if the job speaks of one.
@@ -252,7 +256,11 @@ pub(crate) struct Prepared {
 /// Reads a job and its part, and puts the part in place.
 pub(crate) fn read(file: &Path, overrides: &Overrides) -> Result<Prepared> {
     let mut file = job::read(file, overrides)?;
-    let (part, warnings) = part::read_all(&file.files)?;
+    let Assembled {
+        part,
+        sources,
+        warnings,
+    } = part::read_all(&file.files, &file.reading)?;
     let part = place(part, file.axis)?;
     let job = file.echo();
     let (part, shaped) = lasts::shaped(&part, &mut file)?;
@@ -260,6 +268,7 @@ pub(crate) fn read(file: &Path, overrides: &Overrides) -> Result<Prepared> {
         part,
         file,
         job,
+        sources,
         warnings: warnings.iter().map(ToString::to_string).collect(),
         shaped,
     })
@@ -330,6 +339,7 @@ pub(crate) async fn carry_out(
         part,
         file,
         job,
+        sources,
         mut warnings,
         shaped,
     } = prepared;
@@ -394,6 +404,7 @@ pub(crate) async fn carry_out(
     let report = Report {
         version: VERSION.to_owned(),
         job,
+        files: sources,
         warnings,
         path: PathStatistics::of(&passes.finish, &record.counters),
         verification,

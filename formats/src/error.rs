@@ -141,18 +141,22 @@ pub enum Error {
         name: String,
     },
     /// An extension that no reader knows.
-    #[error("{}: parts are read from STL, OBJ and STEP files (.stl, .obj, .step, .stp); export it as one of them", path.display())]
+    #[error("{}: parts are read from STEP, IGES, STL, OBJ, PLY and 3MF files (.step, .stp, .iges, .igs, .stl, .obj, .ply, .3mf); export it as one of them", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
     },
-    /// A format that is not read yet.
-    #[error("{name}: {format} files are not read yet; export it as STEP, STL or OBJ")]
-    NotYet {
+    /// A format that is known and not read.
+    #[error(
+        "{name}: this is {what}, which is no part that is read; {advice} (parts are STEP, IGES, STL, OBJ, PLY and 3MF files)"
+    )]
+    Foreign {
         /// The file.
         name: String,
-        /// Its format.
-        format: Format,
+        /// What it is.
+        what: &'static str,
+        /// What to do.
+        advice: &'static str,
     },
     /// An extension that contradicts the content.
     #[error("{name}: its extension says {claimed}, but its content is {found}; rename it")]
@@ -214,6 +218,56 @@ pub enum Error {
         /// What the parser says.
         source: Box<step_io::Error>,
     },
+    /// A polygon with less than three corners.
+    #[error(
+        "{name}: face {face} has {corners} corners, but must have three or more; the file is damaged, export it again"
+    )]
+    BadFace {
+        /// The file.
+        name: String,
+        /// The face, from 0.
+        face: usize,
+        /// Its corners.
+        corners: usize,
+    },
+    /// A 3MF package that cannot be read.
+    #[error("{name}: not a readable 3MF file: {reason}")]
+    ThreeMf {
+        /// The file.
+        name: String,
+        /// What is wrong, and where.
+        reason: String,
+    },
+    /// An IGES file whose global section makes no sense.
+    #[error("{name}: its global section (G) cannot be read: {reason}")]
+    IgesGlobal {
+        /// The file.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// An entity of an IGES file that makes no sense.
+    #[error("{name}: the entity of type {kind} at D{number} cannot be read: {reason}")]
+    IgesEntity {
+        /// The file.
+        name: String,
+        /// Its number in the directory.
+        number: usize,
+        /// Its type.
+        kind: u32,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A file in which there is nothing but what a cutter does not touch.
+    #[error(
+        "{name}: nothing in it can be machined; there is {found}. Export the part as surfaces or solids (as B-splines, IGES entity 144 or 128), or as a mesh (STL)"
+    )]
+    NothingUsable {
+        /// The file.
+        name: String,
+        /// What there is.
+        found: String,
+    },
     /// A STEP file without a surface.
     #[error(
         "{name}: there is no surface in it; export the part as surfaces or solids, not as curves or a picture"
@@ -238,7 +292,7 @@ pub enum Error {
     },
     /// Units that cannot be applied.
     #[error("{name}: {reason}; export it in millimetres")]
-    StepUnits {
+    Units {
         /// The file.
         name: String,
         /// What is wrong with them.
@@ -254,7 +308,7 @@ pub enum Error {
     },
     /// A face that is not the whole of its surface.
     #[error(
-        "{name} is trimmed inside its surface; export it untrimmed, or the part as a mesh (STL)"
+        "{name} is trimmed inside its surface; export it untrimmed, or the part as a mesh (STL); or have whole surfaces machined (trimmed = \"whole\" in [part]), which gouges nothing, but leaves what the trim cuts away"
     )]
     Trimmed {
         /// The face.
@@ -262,7 +316,7 @@ pub enum Error {
     },
     /// A face whose edges cannot be read.
     #[error(
-        "{name} has an edge that cannot be read, so its trim is unknown; export it untrimmed, or the part as a mesh (STL)"
+        "{name} has an edge that cannot be read, so its trim is unknown; export it untrimmed, or the part as a mesh (STL); or have whole surfaces machined (trimmed = \"whole\" in [part])"
     )]
     UnreadableTrim {
         /// The face.

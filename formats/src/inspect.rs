@@ -8,7 +8,7 @@ use std::path::Path;
 use horma_core::{Direction, Mesh, Part, Point, Shape, Surface, cross, dot, length, sub};
 
 use crate::error::Result;
-use crate::part::{self, Unit, Warning};
+use crate::part::{self, Reading, Trimmed, Unit, Warning};
 
 /// Opposite sides of a surface that are no further apart than this are one, mm.
 const CLOSED: f64 = 1.0e-6;
@@ -24,8 +24,10 @@ const MAX_POINTS: usize = 1000;
 pub struct Inspection {
     /// The file's name.
     pub file: String,
-    /// The unit of length that it states.
-    pub unit: Option<Unit>,
+    /// The unit in which its lengths are.
+    pub unit: Unit,
+    /// Whether it states that.
+    pub stated: bool,
     /// Its bodies, in file order.
     pub bodies: Vec<BodyInfo>,
     /// What reading it brought up.
@@ -72,12 +74,14 @@ pub enum Kind {
     },
 }
 
-/// Reads the file at `path` and describes it.
+/// Reads the file at `path` and describes it; `unit` is that of its lengths if it states none.
 ///
 /// # Errors
 /// Those of [`part::read`].
-pub fn inspect(path: &Path) -> Result<Inspection> {
-    let loaded = part::read(path)?;
+pub fn inspect(path: &Path, unit: Option<Unit>) -> Result<Inspection> {
+    // What a trim cuts away can be looked at all the same.
+    let trimmed = Trimmed::Whole;
+    let loaded = part::read(path, &Reading { unit, trimmed })?;
     let part = Part {
         bodies: loaded.bodies,
     };
@@ -99,6 +103,7 @@ pub fn inspect(path: &Path) -> Result<Inspection> {
     Ok(Inspection {
         file: name.to_string_lossy().into_owned(),
         unit: loaded.unit,
+        stated: loaded.stated,
         bodies: bodies.collect(),
         warnings: loaded.warnings,
     })
@@ -208,9 +213,18 @@ impl fmt::Display for Inspection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let count = self.bodies.len();
         let bodies = if count == 1 { "body" } else { "bodies" };
-        let unit = self.unit.as_ref();
-        let unit = unit.map_or("no unit stated, taken as mm", |u| u.name.as_str());
-        write!(f, "{}: {count} {bodies}, {unit}", self.file)?;
+        let Unit { name, millimetres } = &self.unit;
+        let name = if *millimetres == 1.0 && !self.stated {
+            "mm"
+        } else {
+            name
+        };
+        let taken = if self.stated {
+            ""
+        } else {
+            "no unit stated, taken as "
+        };
+        write!(f, "{}: {count} {bodies}, {taken}{name}", self.file)?;
         let prefix = format!("{}: ", self.file);
         let rows: Vec<[String; 4]> = self.bodies.iter().map(|b| row(b, &prefix)).collect();
         let width = |i: usize| rows.iter().map(|r| r[i].chars().count()).max().unwrap_or(0);
@@ -248,7 +262,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join(file);
         std::fs::write(&path, content).expect("written");
-        inspect(&path).expect("valid").to_string()
+        inspect(&path, None).expect("valid").to_string()
     }
 
     #[test]

@@ -28,6 +28,7 @@ pub use self::passes::Roughing;
 pub use self::place::Place;
 use self::raw::{At, Given, RawAxis, RawCutter, RawJob};
 use crate::error::{Error, Result};
+use crate::part::{Reading, Trimmed, UNIT_NAMES, Unit};
 use crate::post::Program;
 
 /// Chordal tolerance of a job that does not say, mm.
@@ -49,7 +50,9 @@ pub const MAX_EXTENTS_PER_WORKER: u32 = 1000;
 pub struct JobFile {
     /// The part's files; relative ones start from the job file's folder.
     pub files: Vec<PathBuf>,
-    /// The spindle, in file coordinates.
+    /// What is said of files beside what they say themselves.
+    pub reading: Reading,
+    /// The spindle, in file coordinates, mm.
     pub axis: Axis,
     /// What to compute.
     pub job: Job,
@@ -143,7 +146,7 @@ pub fn parse(text: &str, path: &Path, overrides: &Overrides) -> Result<JobFile> 
         source.wrong(at.as_ref(), reworded(e.message()))
     })?;
     raw.replace(overrides);
-    let (files, axis) = source.part(&raw)?;
+    let (files, reading, axis) = source.part(&raw)?;
     let (contact, method) = source.digitizing(&raw)?;
     let job = Job {
         discretization: source.discretization(&raw)?,
@@ -158,6 +161,7 @@ pub fn parse(text: &str, path: &Path, overrides: &Overrides) -> Result<JobFile> 
     let program = source.program(&raw)?;
     Ok(JobFile {
         files,
+        reading,
         axis,
         job,
         stock: source.stock(&raw)?,
@@ -172,6 +176,7 @@ pub fn parse(text: &str, path: &Path, overrides: &Overrides) -> Result<JobFile> 
 
 const KINDS: [(&str, MotionKind); 2] = [("helix", MotionKind::Helix), ("rings", MotionKind::Rings)];
 const CONTACTS: [(&str, Contact); 2] = [("facet", Contact::Facet), ("point", Contact::Point)];
+const TRIMMED: [(&str, Trimmed); 2] = [("refuse", Trimmed::Refuse), ("whole", Trimmed::Whole)];
 const METHODS: [(&str, Method); 3] = [
     ("exact", Method::Exact),
     ("brute", Method::Brute),
@@ -206,7 +211,7 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    fn part(&self, raw: &RawJob) -> Result<(Vec<PathBuf>, Axis)> {
+    fn part(&self, raw: &RawJob) -> Result<(Vec<PathBuf>, Reading, Axis)> {
         let Some(part) = &raw.part else {
             let what = "there is no [part]; say what to machine, as in files = [\"last.step\"]";
             return Err(self.wrong(None, what));
@@ -225,7 +230,25 @@ impl Source<'_> {
         let folder = self.path.parent().unwrap_or(Path::new(""));
         let files = files.iter().map(|f| folder.join(f)).collect();
         let axis = part.value.axis.as_ref();
-        Ok((files, axis.map_or(Ok(Axis::default()), |a| self.axis(a))?))
+        let axis = axis.map_or(Ok(Axis::default()), |a| self.axis(a))?;
+        let trimmed = part.value.trimmed.as_ref();
+        let reading = Reading {
+            unit: part
+                .value
+                .units
+                .as_ref()
+                .map(|u| self.unit(u))
+                .transpose()?,
+            trimmed: self.choose(trimmed, "trimmed", Trimmed::Refuse, &TRIMMED)?,
+        };
+        Ok((files, reading, axis))
+    }
+
+    fn unit(&self, given: &Given<String>) -> Result<Unit> {
+        Unit::named(&given.value).ok_or_else(|| {
+            let what = format!("unknown unit '{}'; known: {UNIT_NAMES}", given.value);
+            self.wrong(Some(&given.at), what)
+        })
     }
 
     fn axis(&self, given: &Given<toml::Value>) -> Result<Axis> {

@@ -14,6 +14,7 @@ use serde_json::Value;
 use crate::error::Result;
 use crate::lasts::Lasts;
 use crate::output;
+use crate::part::Source;
 use crate::post::Program;
 
 /// A run's report.
@@ -23,6 +24,9 @@ pub struct Report {
     pub version: String,
     /// The job in effect, keyed as a job file is.
     pub job: Value,
+    /// The part's files, each with the unit of its lengths; none in a report of an older version.
+    #[serde(default)]
+    pub files: Vec<Source>,
     /// What the machinist should know, such as the open edges of a mesh.
     pub warnings: Vec<String>,
     /// The path.
@@ -323,6 +327,13 @@ mod tests {
         let report = Report {
             version: "0.1.0".to_owned(),
             job: serde_json::json!({ "cutter": { "kind": "ball", "radius": 5.0 } }),
+            files: vec![Source {
+                file: "last.stl".to_owned(),
+                unit: "inch".to_owned(),
+                millimetres: 25.4,
+                stated: false,
+                bodies: 1,
+            }],
             warnings: vec!["last.stl: 3 edges are open".to_owned()],
             path: PathStatistics::of(&path(), &Counters::default()),
             verification: None,

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::machine::{LIMITS, Machine};
 use super::program::{ANGLES, FEED_MODES, POINTS, UNITS};
-use super::{CONTACTS, JobFile, KINDS, last, passes};
+use super::{CONTACTS, JobFile, KINDS, TRIMMED, last, passes};
 use crate::post::{Program, Split};
 
 impl JobFile {
@@ -24,7 +24,12 @@ impl JobFile {
         };
         let motion = self.job.motion;
         let mut echo = json!({
-            "part": { "files": files, "axis": axis },
+            "part": {
+                "files": files,
+                "axis": axis,
+                "units": self.reading.unit.as_ref().map(|u| &u.name),
+                "trimmed": name_of(&TRIMMED, &self.reading.trimmed),
+            },
             "discretization": discretization,
             "cutter": cutter_echo(&self.job.cutter),
             "motion": {

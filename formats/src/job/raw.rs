@@ -81,6 +81,8 @@ pub(super) struct RawJob {
 pub(super) struct RawPart {
     pub(super) files: Option<Given<Vec<PathBuf>>>,
     pub(super) axis: Option<Given<toml::Value>>,
+    pub(super) units: Option<Given<String>>,
+    pub(super) trimmed: Option<Given<String>>,
 }
 
 #[derive(Debug, Deserialize)]

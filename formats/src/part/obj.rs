@@ -9,8 +9,8 @@ use std::collections::HashMap;
 
 use horma_core::{Body, Mesh, Point, Shape};
 
-use super::Loaded;
 use super::stl::shortened;
+use super::{Loaded, Reading, foreign};
 use crate::error::{Error, Result};
 
 /// Reads an OBJ file called `name`: one mesh for each object (`o`) that has faces. Polygons become
@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 /// # Errors
 /// [`Error::Syntax`] with the line, [`Error::NoTriangle`], [`horma_core::Error::NotFinite`] and
 /// [`horma_core::Error::TooFar`].
-pub fn parse(name: &str, bytes: &[u8]) -> Result<Loaded> {
+pub fn parse(name: &str, bytes: &[u8], reading: &Reading) -> Result<Loaded> {
     let text = String::from_utf8_lossy(bytes);
     let mut vertices: Vec<Point> = Vec::new();
     let mut objects = vec![Object::default()];
@@ -79,8 +79,15 @@ pub fn parse(name: &str, bytes: &[u8]) -> Result<Loaded> {
     }
     objects.retain(|o| !o.triangles.is_empty());
     if objects.is_empty() {
-        return Err(Error::NoTriangle {
-            name: name.to_owned(),
+        let name = name.to_owned();
+        return Err(if vertices.is_empty() {
+            Error::NoTriangle { name }
+        } else {
+            Error::Foreign {
+                name,
+                what: "a list of points: it has vertices, but no faces",
+                advice: foreign::POINTS,
+            }
         });
     }
     let alone = objects.len() == 1;
@@ -90,7 +97,7 @@ pub fn parse(name: &str, bytes: &[u8]) -> Result<Loaded> {
             (_, "") => format!("{name}: object {number}"),
             (_, own) => format!("{name}: {own}"),
         };
-        let mesh = compact(&body, &vertices, &object.triangles)?;
+        let mesh = compact(&body, &vertices, &object.triangles, reading.scale())?;
         Ok(Body {
             name: body,
             shape: Shape::Mesh(mesh),
@@ -98,7 +105,8 @@ pub fn parse(name: &str, bytes: &[u8]) -> Result<Loaded> {
     });
     Ok(Loaded {
         bodies: bodies.collect::<Result<_>>()?,
-        unit: None,
+        unit: reading.assumed(),
+        stated: false,
         warnings: Vec::new(),
     })
 }
@@ -140,14 +148,14 @@ fn corner(word: &str, vertices: usize) -> std::result::Result<u32, String> {
         })
 }
 
-/// A mesh with only those vertices that its triangles name.
-fn compact(name: &str, vertices: &[Point], triangles: &[[u32; 3]]) -> Result<Mesh> {
+/// A mesh with only those vertices that its triangles name, times `scale`.
+fn compact(name: &str, vertices: &[Point], triangles: &[[u32; 3]], scale: f64) -> Result<Mesh> {
     let mut places = HashMap::new();
     let mut own = Vec::new();
     let triangles = triangles.iter().map(|t| {
         t.map(|v| {
             *places.entry(v).or_insert_with(|| {
-                own.push(vertices[v as usize].map(|c| c + 0.0));
+                own.push(vertices[v as usize].map(|c| c * scale + 0.0));
                 own.len() as u32 - 1
             })
         })
@@ -163,7 +171,9 @@ mod tests {
     const SQUARE: &str = "mtllib none.mtl\nv 0 0 0\nv 1 0 0 0.5 0.5 0.5\nv 1 1 0 1.0\nv 0 1 0\n";
 
     fn meshes(text: &str) -> Vec<(String, Mesh)> {
-        let bodies = parse("t.obj", text.as_bytes()).expect("valid").bodies;
+        let bodies = parse("t.obj", text.as_bytes(), &Reading::default())
+            .expect("valid")
+            .bodies;
         let mesh = |b: Body| match b.shape {
             Shape::Mesh(mesh) => (b.name, mesh),
             Shape::Surface(_) => unreachable!("OBJ has meshes only"),
@@ -200,7 +210,7 @@ mod tests {
     fn nonsense_is_refused_by_line() {
         let check = |lines: &str, expected: &str| {
             let text = format!("{SQUARE}{lines}");
-            let error = parse("t.obj", text.as_bytes())
+            let error = parse("t.obj", text.as_bytes(), &Reading::default())
                 .expect_err(lines)
                 .to_string();
             assert!(error.contains(expected), "{lines}: {error}");
@@ -220,7 +230,7 @@ mod tests {
         check("v 0 0 inf\nf 1 2 3\n", "three finite numbers");
         check("v 1e7 0 0\nf 1 2 5\n", "beyond the 1000000 mm");
         check("cstype bspline\n", "export it as STEP");
-        check("", "no triangle");
+        check("", "a list of points");
     }
 
     #[test]

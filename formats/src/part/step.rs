@@ -4,7 +4,7 @@
 //! millimetres and where its assembly puts it. Analytic surfaces become the rational B-splines that
 //! are exactly the same. A face that is trimmed inside its surface, a surface of another kind and a
 //! surface that got lost in reading are refused by name: machined without, the part would be
-//! gouged.
+//! gouged. On demand trimmed faces count as their whole surfaces.
 
 mod assembly;
 mod free;
@@ -14,17 +14,17 @@ mod trim;
 use horma_core::{Body, Direction, Shape, Surface};
 use step_io::scene::{Face, NurbsSurface, Scene, SurfaceKind};
 
-use self::assembly::Matrix;
-use super::{Loaded, Warning};
+use super::matrix::{IDENTITY, Matrix, apply};
+use super::{Loaded, Reading, Trims, Unit, Warning, label};
 use crate::error::{Error, Result};
 
 /// Reads a STEP file called `name` (ISO 10303-21; AP203, AP214, AP242).
 ///
 /// # Errors
-/// [`Error::StepSyntax`], [`Error::StepLoss`], [`Error::StepUnits`], [`Error::StepAssembly`],
+/// [`Error::StepSyntax`], [`Error::StepLoss`], [`Error::Units`], [`Error::StepAssembly`],
 /// [`Error::Trimmed`], [`Error::UnreadableTrim`], [`Error::UnsupportedSurface`],
 /// [`Error::NoSurface`], and those of [`Surface::new`].
-pub fn parse(name: &str, bytes: &[u8]) -> Result<Loaded> {
+pub fn parse(name: &str, bytes: &[u8], reading: &Reading) -> Result<Loaded> {
     let (model, report) = step_io::read(bytes).map_err(|source| Error::StepSyntax {
         name: name.to_owned(),
         source: Box::new(source),
@@ -32,7 +32,8 @@ pub fn parse(name: &str, bytes: &[u8]) -> Result<Loaded> {
     let mut warnings = loss::check(name, bytes, &report)?;
     let scene = model.scene();
     let unit = loss::unit(name, &scene)?;
-    let scale = unit.as_ref().map_or(1.0, |u| u.millimetres);
+    let scale = unit.as_ref().map_or(reading.scale(), |u| u.millimetres);
+    let mut trims = Trims::new(reading);
     let tree = assembly::walk(name, &scene)?;
 
     let mut bodies = Vec::new();
@@ -54,7 +55,7 @@ pub fn parse(name: &str, bytes: &[u8]) -> Result<Loaded> {
     };
     for (number, face) in (1..).zip(scene.all_faces()) {
         let label = label(name, number, [face.name(), ""]);
-        let nurbs = untrimmed(&label, &scene, &face, scale)?;
+        let nurbs = untrimmed(&label, &scene, &face, scale, &mut trims)?;
         keep(face.name(), face.key(), &nurbs)?;
     }
     for (key, own, nurbs) in free::surfaces(name, &model)? {
@@ -66,44 +67,45 @@ pub fn parse(name: &str, bytes: &[u8]) -> Result<Loaded> {
         });
     }
     match &unit {
-        None => warnings.push(Warning::NoUnit {
+        None if reading.unit.is_none() => warnings.push(Warning::NoUnit {
             name: name.to_owned(),
+            unit: Unit::default().name,
         }),
         Some(unit) if unit.millimetres != 1.0 => warnings.push(Warning::Converted {
             name: name.to_owned(),
             unit: unit.name.clone(),
             factor: unit.millimetres,
         }),
-        Some(_) => {}
+        None | Some(_) => {}
     }
     warnings.extend(loss::navigation(name, &scene));
+    warnings.extend(trims.warning(name));
     Ok(Loaded {
         bodies,
-        unit,
+        stated: unit.is_some(),
+        unit: unit.unwrap_or_else(|| reading.assumed()),
         warnings,
     })
 }
 
-/// File, number, and the first of `names` that says something.
-fn label(file: &str, number: usize, names: [&str; 2]) -> String {
-    // Writers fill the mandatory name with these when there is none.
-    let says_nothing = |n: &&str| {
-        n.is_empty() || n.eq_ignore_ascii_case("none") || n.starts_with("Open CASCADE STEP")
-    };
-    match names.into_iter().find(|n| !says_nothing(n)) {
-        Some(own) => format!("{file}: surface {number} '{own}'"),
-        None => format!("{file}: surface {number}"),
-    }
-}
-
-/// The whole surface under a face, if the face is all of it.
-fn untrimmed(label: &str, scene: &Scene, face: &Face, scale: f64) -> Result<NurbsSurface> {
+/// The whole surface under a face, if the face is all of it or whole surfaces count.
+fn untrimmed(
+    label: &str,
+    scene: &Scene,
+    face: &Face,
+    scale: f64,
+    trims: &mut Trims,
+) -> Result<NurbsSurface> {
     let nurbs = face.to_nurbs().ok_or_else(|| Error::UnsupportedSurface {
         name: label.to_owned(),
         kind: kind(face),
     })?;
-    let here = surface(label, &nurbs, &assembly::IDENTITY, scale)?;
-    trim::check(label, face, &here, scale, scene.units().precision)?;
+    let here = surface(label, &nurbs, &IDENTITY, scale)?;
+    match trim::check(label, face, &here, scale, scene.units().precision) {
+        Err(Error::Trimmed { .. }) => trims.inside(label)?,
+        Err(_) if trims.count_whole() => trims.inside(label)?,
+        checked => checked?,
+    }
     Ok(nurbs)
 }
 
@@ -135,7 +137,7 @@ fn surface(name: &str, nurbs: &NurbsSurface, matrix: &Matrix, scale: f64) -> Res
         knots: knots.to_vec(),
     };
     let poles = nurbs.control_points.iter().flatten();
-    let poles = poles.map(|&p| assembly::apply(matrix, p, scale)).collect();
+    let poles = poles.map(|&p| apply(matrix, p, scale)).collect();
     Ok(Surface::new(
         name,
         direction(nurbs.degree_u, &nurbs.knots_u),

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use horma_core::{Body, Mesh, Point, Shape};
 
-use super::{Loaded, Warning};
+use super::{Loaded, Reading, Warning};
 use crate::error::{Error, Result};
 
 const HEADER: usize = 84;
@@ -21,7 +21,7 @@ const FACET: usize = 50;
 /// [`Error::StlLength`] if the length contradicts the header, [`Error::Syntax`] for ASCII that
 /// makes no sense, [`Error::NoTriangle`], [`horma_core::Error::NotFinite`] and
 /// [`horma_core::Error::TooFar`].
-pub fn parse(name: &str, bytes: &[u8]) -> Result<Loaded> {
+pub fn parse(name: &str, bytes: &[u8], reading: &Reading) -> Result<Loaded> {
     let mut warnings = Vec::new();
     let facets = if is_ascii(bytes) {
         parse_ascii(name, &String::from_utf8_lossy(bytes))?
@@ -42,11 +42,12 @@ pub fn parse(name: &str, bytes: &[u8]) -> Result<Loaded> {
     }
     let body = Body {
         name: name.to_owned(),
-        shape: Shape::Mesh(weld(name, &facets)?),
+        shape: Shape::Mesh(weld(name, &facets, reading.scale())?),
     };
     Ok(Loaded {
         bodies: vec![body],
-        unit: None,
+        unit: reading.assumed(),
+        stated: false,
         warnings,
     })
 }
@@ -214,14 +215,14 @@ pub(super) fn shortened(line: &str) -> String {
     short
 }
 
-/// Vertices of the same bits become one.
-fn weld(name: &str, facets: &[[Point; 3]]) -> Result<Mesh> {
+/// Vertices of the same bits become one, times `scale`.
+fn weld(name: &str, facets: &[[Point; 3]], scale: f64) -> Result<Mesh> {
     let mut places = HashMap::with_capacity(facets.len() / 2);
     let mut vertices = Vec::with_capacity(facets.len() / 2);
     let triangles = facets.iter().map(|corners| {
         corners.map(|corner| {
             // −0 and 0 are the same place. A file of 16 GiB has fewer vertices than a u32 counts.
-            let corner = corner.map(|c| c + 0.0);
+            let corner = corner.map(|c| c * scale + 0.0);
             *places.entry(corner.map(f64::to_bits)).or_insert_with(|| {
                 vertices.push(corner);
                 vertices.len() as u32 - 1
@@ -261,14 +262,21 @@ mod tests {
     const FACET_B: [Point; 3] = [[1.0, 0.0, -0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
 
     fn mesh(bytes: &[u8]) -> Mesh {
-        match parse("t.stl", bytes).expect("valid").bodies.remove(0).shape {
+        match parse("t.stl", bytes, &Reading::default())
+            .expect("valid")
+            .bodies
+            .remove(0)
+            .shape
+        {
             Shape::Mesh(mesh) => mesh,
             Shape::Surface(_) => unreachable!("STL has meshes only"),
         }
     }
 
     fn refused(bytes: &[u8], expected: &str) {
-        let error = parse("t.stl", bytes).expect_err(expected).to_string();
+        let error = parse("t.stl", bytes, &Reading::default())
+            .expect_err(expected)
+            .to_string();
         assert!(
             error.starts_with("t.stl: ") && error.contains(expected),
             "{error}"
@@ -322,7 +330,7 @@ mod tests {
         refused(&binary(b"", u32::MAX, &[FACET_A]), "states 4294967295");
         let mut long = good.clone();
         long.extend([0; 7]);
-        let loaded = parse("t.stl", &long).expect("valid");
+        let loaded = parse("t.stl", &long, &Reading::default()).expect("valid");
         assert_eq!(
             loaded.warnings[0].to_string(),
             "t.stl: 7 bytes after the last triangle are not read"

@@ -122,7 +122,7 @@ fn the_committed_example_is_what_this_code_writes() {
 
 #[test]
 fn the_example_reads_back_pole_for_pole() {
-    let loaded = part::read(&example(PART)).expect("readable");
+    let loaded = part::read(&example(PART), &part::Reading::default()).expect("readable");
     assert_eq!(loaded.warnings, []);
     let expected = last(&LastStyle::WOMEN).expect("valid").bodies;
     assert_eq!(loaded.bodies.len(), expected.len());

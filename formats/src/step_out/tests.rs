@@ -1,7 +1,7 @@
 use horma_core::{Body, Shape};
 
 use super::*;
-use crate::part::{self, Format};
+use crate::part::{self, Format, Reading};
 
 /// A direction of degree `degree` with `poles` poles, clamped, on irregular knots.
 fn direction(degree: usize, poles: usize) -> Direction {
@@ -30,7 +30,13 @@ fn surface(m: usize, n: usize, rational: bool, place: impl Fn(usize, usize) -> P
 #[track_caller]
 fn read_back(surfaces: &[(&str, &Surface)]) -> Vec<Body> {
     let text = write("parts.step", surfaces);
-    let loaded = part::parse("parts.step", Format::Step, text.as_bytes()).expect("readable");
+    let loaded = part::parse(
+        "parts.step",
+        Format::Step,
+        text.as_bytes(),
+        &Reading::default(),
+    )
+    .expect("readable");
     assert_eq!(loaded.warnings, []);
     let shapes: Vec<&Shape> = loaded.bodies.iter().map(|b| &b.shape).collect();
     let expected: Vec<Shape> = surfaces

@@ -40,6 +40,7 @@ fn report() -> Report {
     Report {
         version: "0.1.0".to_owned(),
         job: serde_json::Value::Null,
+        files: Vec::new(),
         warnings: vec!["</script><script>alert(1)</script>".to_owned()],
         path: PathStatistics::of(&path(), &record.counters),
         verification: None,

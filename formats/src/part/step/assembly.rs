@@ -2,21 +2,11 @@
 
 use std::collections::HashMap;
 
-use horma_core::Point;
 use step_io::EntityKey;
 use step_io::scene::{ProductDef, Scene, SetElement};
 
+use super::super::matrix::{self, IDENTITY, Matrix};
 use crate::error::{Error, Result};
-
-/// A rigid motion, rows first, in the file's unit of length.
-pub(super) type Matrix = [[f64; 4]; 4];
-
-pub(super) const IDENTITY: Matrix = [
-    [1.0, 0.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0, 0.0],
-    [0.0, 0.0, 1.0, 0.0],
-    [0.0, 0.0, 0.0, 1.0],
-];
 
 /// Most components of an assembly; nested often enough, a small file could ask for any number.
 const MAX_COMPONENTS: usize = 100_000;
@@ -61,18 +51,6 @@ pub(super) fn walk(name: &str, scene: &Scene) -> Result<Tree> {
     Ok(tree)
 }
 
-/// `p` moved by `matrix` and scaled to mm.
-pub(super) fn apply(matrix: &Matrix, p: Point, scale: f64) -> Point {
-    // The usual case keeps the bits of the file.
-    if *matrix == IDENTITY {
-        return p.map(|c| c * scale);
-    }
-    std::array::from_fn(|i| {
-        let [a, b, c, d] = matrix[i];
-        (a * p[0] + b * p[1] + c * p[2] + d) * scale
-    })
-}
-
 impl Tree {
     /// The places of the face or free surface `key`; where it is, if nothing places it.
     pub(super) fn of(&self, name: &str, key: EntityKey) -> Result<Vec<&Placement>> {
@@ -87,7 +65,7 @@ impl Tree {
         }
     }
 
-    fn add(&mut self, name: &str, def: &ProductDef, matrix: &Matrix, depth: usize) -> Result<()> {
+    fn add(&mut self, name: &str, def: &ProductDef, outer: &Matrix, depth: usize) -> Result<()> {
         self.components += 1;
         if self.components > MAX_COMPONENTS || depth > MAX_DEPTH {
             return Err(refused(
@@ -99,7 +77,7 @@ impl Tree {
         let mut put = |key, own: &str| {
             let label = if own.is_empty() { product } else { own };
             self.placements.entry(key).or_default().push(Placement {
-                matrix: *matrix,
+                matrix: *outer,
                 label: label.to_owned(),
             });
         };
@@ -127,14 +105,10 @@ impl Tree {
             let Some(step) = occurrence.transform().and_then(|t| t.matrix()) else {
                 return Err(refused(name, "the placement of a component cannot be read"));
             };
-            self.add(name, &child, &product_of(matrix, &step), depth + 1)?;
+            self.add(name, &child, &matrix::product(outer, &step), depth + 1)?;
         }
         Ok(())
     }
-}
-
-fn product_of(a: &Matrix, b: &Matrix) -> Matrix {
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..4).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
 fn refused(name: &str, reason: &'static str) -> Error {

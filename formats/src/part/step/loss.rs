@@ -102,7 +102,7 @@ fn keywords(bytes: &[u8]) -> HashMap<u64, String> {
 /// The file's unit of length, if it states one.
 pub(super) fn unit(name: &str, scene: &Scene) -> Result<Option<Unit>> {
     let refused = |reason: String| {
-        Err(Error::StepUnits {
+        Err(Error::Units {
             name: name.to_owned(),
             reason,
         })

@@ -104,7 +104,9 @@ fn whole_patch() -> Vec<u8> {
 }
 
 fn surfaces(bytes: &[u8]) -> Vec<(String, Surface)> {
-    let bodies = parse("t.step", bytes).expect("valid").bodies;
+    let bodies = parse("t.step", bytes, &Reading::default())
+        .expect("valid")
+        .bodies;
     let surface = |b: Body| match b.shape {
         Shape::Surface(surface) => (b.name, surface),
         Shape::Mesh(_) => unreachable!("STEP has surfaces only"),
@@ -114,7 +116,9 @@ fn surfaces(bytes: &[u8]) -> Vec<(String, Surface)> {
 
 #[track_caller]
 fn refused(bytes: &[u8], expected: &str) {
-    let error = parse("t.step", bytes).expect_err(expected).to_string();
+    let error = parse("t.step", bytes, &Reading::default())
+        .expect_err(expected)
+        .to_string();
     assert!(
         error.starts_with("t.step: ") && error.contains(expected),
         "{error}"
@@ -128,7 +132,12 @@ fn an_untrimmed_face_is_its_surface() {
     assert_eq!(all[0].0, "t.step: surface 1 'body'");
     assert_eq!(all[0].1.poles()[2], [10.0, 0.0, 0.0]);
     assert_eq!(all[0].1.weights(), None);
-    assert_eq!(parse("t.step", &whole_patch()).expect("valid").warnings, []);
+    assert_eq!(
+        parse("t.step", &whole_patch(), &Reading::default())
+            .expect("valid")
+            .warnings,
+        []
+    );
 }
 
 #[test]
@@ -175,7 +184,7 @@ fn lengths_become_millimetres() {
     let bounds = vec![outline(&mut b, &WHOLE)];
     add(&mut b, part, patch(), bounds);
     let bytes = text(b);
-    let loaded = parse("t.step", &bytes).expect("valid");
+    let loaded = parse("t.step", &bytes, &Reading::default()).expect("valid");
     let (_, surface) = surfaces(&bytes).remove(0);
     assert!((surface.poles()[2][0] - 10_000.0).abs() < 1e-9);
     let converted = "lengths are converted from metre to mm, times 1000";
@@ -215,7 +224,9 @@ fn free_surfaces_are_read_with_a_warning_about_units() {
     );
     assert_eq!(all[0].1.weights(), None);
     assert_eq!(all[1].1.weights(), Some(&[1.0, 2.0, 1.0, 1.0][..]));
-    let warnings = parse("t.step", FREE.as_bytes()).expect("valid").warnings;
+    let warnings = parse("t.step", FREE.as_bytes(), &Reading::default())
+        .expect("valid")
+        .warnings;
     assert!(
         warnings[0].to_string().contains("lengths are taken as mm"),
         "{warnings:?}"
@@ -262,6 +273,9 @@ fn a_file_without_a_surface_is_refused() {
 fn a_truncated_file_is_refused() {
     let bytes = whole_patch();
     for cut in (0..bytes.len() - 20).step_by(97) {
-        assert!(parse("t.step", &bytes[..cut]).is_err(), "cut at {cut}");
+        assert!(
+            parse("t.step", &bytes[..cut], &Reading::default()).is_err(),
+            "cut at {cut}"
+        );
     }
 }
