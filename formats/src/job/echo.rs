@@ -27,7 +27,6 @@ impl JobFile {
             "part": {
                 "files": files,
                 "axis": axis,
-                "units": self.reading.unit.as_ref().map(|u| &u.name),
                 "trimmed": name_of(&TRIMMED, &self.reading.trimmed),
             },
             "discretization": discretization,
@@ -51,6 +50,9 @@ impl JobFile {
             "program": program_echo(&self.program),
             "machine": machine_echo(&self.machine),
         });
+        if let Some(unit) = &self.reading.unit {
+            echo["part"]["units"] = json!(unit.name);
+        }
         for (section, said) in passes::echo(self) {
             echo[section] = said;
         }

@@ -25,8 +25,10 @@ pub fn parse(name: &str, bytes: &[u8], reading: &Reading) -> Result<Loaded> {
     };
     let failed = |e: ply_rs_bw::parser::ParseError| {
         let message = e.to_string();
-        // Its second line repeats the text that is wrong, which may be long.
+        // Its second line repeats the text that is wrong, which may be long, and it begins with the line.
         let first = message.lines().next().unwrap_or_default();
+        let line = format!("Line {}: ", e.line().unwrap_or_default());
+        let first = first.strip_prefix(&line).unwrap_or(first);
         let reason = first.trim_end_matches('.').to_owned();
         wrong(e.line().unwrap_or_default(), reason)
     };

@@ -15,7 +15,7 @@ use horma_core::{Body, Direction, Shape, Surface};
 use step_io::scene::{Face, NurbsSurface, Scene, SurfaceKind};
 
 use super::matrix::{IDENTITY, Matrix, apply};
-use super::{Loaded, Reading, Trims, Unit, Warning, label};
+use super::{Loaded, Reading, Trims, Warning, label};
 use crate::error::{Error, Result};
 
 /// Reads a STEP file called `name` (ISO 10303-21; AP203, AP214, AP242).
@@ -69,7 +69,7 @@ pub fn parse(name: &str, bytes: &[u8], reading: &Reading) -> Result<Loaded> {
     match &unit {
         None if reading.unit.is_none() => warnings.push(Warning::NoUnit {
             name: name.to_owned(),
-            unit: Unit::default().name,
+            unit: "mm".to_owned(),
         }),
         Some(unit) if unit.millimetres != 1.0 => warnings.push(Warning::Converted {
             name: name.to_owned(),

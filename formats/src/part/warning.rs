@@ -28,7 +28,9 @@ pub enum Warning {
         vertices: usize,
     },
     /// Cracks that were closed.
-    #[error("{name}: {vertices} vertices at open edges are joined to others within {tolerance} mm")]
+    #[error(
+        "{name}: {vertices} vertices at open edges are joined to others within {tolerance:.6} mm"
+    )]
     Cracks {
         /// The mesh.
         name: String,

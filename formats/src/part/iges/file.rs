@@ -320,7 +320,8 @@ fn check_counts(line: &[u8], counts: [usize; 4]) -> std::result::Result<(), Stri
 /// The delimiters, and the parameters from the third on.
 fn global_section(text: &[u8]) -> std::result::Result<(Delimiters, Vec<Vec<u8>>), String> {
     let (parameter, rest) = delimiter(text.trim_ascii_start(), b',')?;
-    let rest = rest.strip_prefix(&[parameter]).unwrap_or(rest);
+    let rest = rest.strip_prefix(&[parameter]);
+    let rest = rest.ok_or("its first delimiter is not followed by itself")?;
     let (record, rest) = delimiter(rest.trim_ascii_start(), b';')?;
     let delimiters = Delimiters { parameter, record };
     if parameter == record {
@@ -368,6 +369,7 @@ fn fields(text: &[u8], delimiters: Delimiters) -> std::result::Result<Vec<&[u8]>
         match rest.split_first() {
             Some((&found, behind)) if found == parameter => rest = behind,
             Some((&found, _)) if found == record => break,
+            None => return Err("it has no end; export it again".to_owned()),
             _ => {
                 return Err(format!(
                     "something follows '{}' without a delimiter",

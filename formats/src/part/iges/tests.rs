@@ -184,8 +184,9 @@ fn delimiters_and_strings_of_all_kinds() {
     bytes = bytes.replace("128,1/", "128/1/");
     assert_eq!(loaded(bytes.as_bytes()).bodies, loaded(&patch()).bodies);
     refused(&file("1HA1HB;", &[]), "cannot be a delimiter");
-    refused(&file("1H/,1H/;", &[]), "same delimiter");
-    refused(&file(",,9Hpart,;", &[]), "runs over its end");
+    refused(&file("1H//1H/;", &[]), "same delimiter");
+    refused(&file("1H/,4Hpart;", &[]), "followed by");
+    refused(&file(",,99Hpart,;", &[]), "runs over its end");
     refused(&file(",,4Hpart", &[]), "has no end");
 }
 

@@ -86,7 +86,7 @@ fn what_is_wrong_is_told_by_line_or_by_face() {
     refused(&ascii().replace("3 0 1 2", "3 0 1 -1"), "triangle 0");
     refused(&ascii().replace("3 0 1 2", "2 0 1"), "face 0 has 2 corners");
     refused(&ascii().replace("3 0 1 2", "0"), "face 0 has 0 corners");
-    refused(&ascii().replace("0 0 0.5", "nan 0 0.5"), "vertex 0 is NaN");
+    refused(&ascii().replace("0 0 0.5", "nan 0 0.5"), "line 14");
     refused(&ascii().replace("property float x\n", ""), "x, y and z");
     refused(
         &ascii().replace("vertex_indices", "other"),

@@ -114,7 +114,7 @@ pub(super) fn targets(file: impl BufRead) -> Result<Option<String>> {
         };
         let kind = attribute(tag, "Type")?.unwrap_or_default();
         if kind.ends_with("/3dmodel") && found.is_none() {
-            found = attribute(tag, "Target")?.map(relative);
+            found = attribute(tag, "Target")?.as_deref().map(relative);
         }
         Ok(())
     })?;
@@ -199,7 +199,7 @@ fn component(tag: &BytesStart) -> Result<Component> {
     };
     Ok(Component {
         object: whole(tag, "objectid")?,
-        path: attribute(tag, "path")?.map(relative),
+        path: attribute(tag, "path")?.as_deref().map(relative),
         matrix,
     })
 }
@@ -218,7 +218,7 @@ fn matrix(text: &str) -> Option<Matrix> {
 }
 
 /// Names in an archive have no slash in front.
-fn relative(path: String) -> String {
+fn relative(path: &str) -> String {
     path.trim_start_matches('/').to_owned()
 }
 
