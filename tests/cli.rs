@@ -615,6 +615,48 @@ fn inspect_tells_what_is_in_a_file() {
 }
 
 #[test]
+fn units_are_those_of_the_file_or_said_and_told() {
+    let dir = scratch();
+    let dir = dir.path();
+    let parts = Path::new(env!("CARGO_MANIFEST_DIR")).join("formats/tests/parts");
+    let said = |file: &str, more: &[&str]| {
+        let file = parts.join(file);
+        succeed(&[&["inspect", text(&file)], more].concat())
+    };
+    assert!(said("slope.igs", &[]).contains("1 body, inch\n"));
+    assert!(said("wedge.ply", &[]).contains("no unit stated, taken as mm\n"));
+    let inches = said("wedge.3mf", &["--units", "inch"]);
+    assert!(inches.contains("30.00 × 20.00 × 10.00"), "{inches}");
+    let inches = said("wedge.stl", &["--units", "inch"]);
+    assert!(inches.contains("762.00 × 508.00 × 254.00"), "{inches}");
+    let unknown = run(&["inspect", text(&parts.join("wedge.stl")), "--units", "ell"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(texts(&unknown).1.contains("known: mm"), "{unknown:?}");
+
+    let files = ["wedge.stl", "wedge.3mf"].map(|f| parts.join(f));
+    let part = [&files[0], &files[1]].map(PathBuf::as_path);
+    let with = |units: &str| {
+        job(
+            dir,
+            "job.toml",
+            &part,
+            &format!("units = \"{units}\"\n{GOOD}"),
+        )
+    };
+    check_job(dir, &with("ell"), 2, &["job.toml", "unknown unit 'ell'"]);
+    let out = dir.join("out");
+    succeed(&["run", text(&with("inch")), "-o", text(&out), "-q"]);
+    let report = report(&out);
+    assert_eq!(report["job"]["part"]["units"], "inch");
+    let told: Vec<_> = report["files"].as_array().expect("a list").iter().collect();
+    assert_eq!(told[0]["unit"], "inch");
+    assert_eq!(told[0]["millimetres"], 25.4);
+    assert_eq!(told[0]["stated"], false);
+    assert_eq!(told[1]["unit"], "millimetre");
+    assert_eq!(told[1]["stated"], true);
+}
+
+#[test]
 fn help_teaches_and_completions_complete() {
     let help = succeed(&["--help"]);
     for word in ["horma init", "horma submit", "Exit codes", "run", "worker"] {

@@ -107,7 +107,7 @@ pub enum Warning {
     },
     /// Faces that are trimmed inside their surfaces and count whole.
     #[error(
-        "{name}: {faces} faces are trimmed inside their surfaces, {first} for one; as trimmed = \"whole\" in [part] has it they count whole, so nothing is gouged, but what the trim cuts away is left"
+        "{name}: {faces} faces are trimmed inside their surfaces, {first} for one, and count whole, as a job may say (trimmed = \"whole\" in [part]): nothing is gouged, but what the trim cuts away is left"
     )]
     Whole {
         /// The file.

@@ -5,8 +5,11 @@
 use horma_core::Shape;
 use horma_formats::part::{Format, Reading, Trimmed, heal, parse};
 
-/// Each reader, by its format's usual extension.
-pub const READERS: [(&str, fn(&[u8])); 6] = [
+/// A reader to try.
+pub type Reader = fn(&[u8]);
+
+/// Each of them, by its format's usual extension.
+pub const READERS: [(&str, Reader); 6] = [
     ("step", step),
     ("igs", iges),
     ("stl", stl),

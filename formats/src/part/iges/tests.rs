@@ -126,7 +126,7 @@ fn surfaces(bytes: &[u8]) -> Vec<Surface> {
 }
 
 fn corners(surface: &Surface) -> Vec<Point> {
-    let [u, v] = [surface.u(), surface.v()].map(|d| d.domain());
+    let [u, v] = [surface.u(), surface.v()].map(horma_core::Direction::domain);
     surface.grid(&[u.0, u.1], &[v.0, v.1])
 }
 
