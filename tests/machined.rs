@@ -4,25 +4,33 @@ mod common;
 
 use std::path::Path;
 
-use common::{job, sample, scratch, succeed, text};
+use common::{job, lower, report, sample, scratch, succeed, text};
+use serde_json::Value;
 
-/// Deepest gouge, mm, and where it is: travel and angle; and the share of rays within the tolerance.
-fn machined(path: &Path, job: &Path, out: &Path) -> (f64, [f64; 2], f64) {
-    let told = succeed(&[
-        "machined",
-        text(path),
-        text(job),
-        "-o",
-        text(out),
-        "--json",
-        "--columns",
-        "360",
-    ]);
-    let told: serde_json::Value = serde_json::from_str(&told).expect("JSON");
-    let number = |pointer: &str| told.pointer(pointer).and_then(serde_json::Value::as_f64);
-    let gouge = |key: &str| number(&format!("/deepest_gouge/{key}")).unwrap_or(0.0);
-    let within = number("/within_tolerance").expect("a tolerance");
-    (-gouge("deviation"), [gouge("x"), gouge("angle")], within)
+fn number(value: &Value, pointer: &str) -> f64 {
+    let number = value.pointer(pointer).and_then(Value::as_f64);
+    number.unwrap_or_else(|| panic!("no {pointer} in {value}"))
+}
+
+/// Deepest gouge of a report, mm, and where it is: travel and angle.
+fn deepest(report: &Value) -> (f64, [f64; 2]) {
+    let gouge = &report["machined"]["deepest_gouge"];
+    if gouge.is_null() {
+        return (0.0, [f64::NAN; 2]);
+    }
+    let at = ["/x", "/angle"].map(|key| number(gouge, key));
+    (-number(gouge, "/deviation"), at)
+}
+
+/// Whether a deepest gouge is where the cutter was, at such an angle, as near as rays half a millimetre and a
+/// degree apart can tell.
+fn check_at([x, angle]: [f64; 2], [at_x, at_angle]: [f64; 2]) {
+    assert!((at_x - x).abs() <= 0.5, "at x {at_x} instead of {x}");
+    let apart = (at_angle - angle).rem_euclid(360.0);
+    assert!(
+        apart.min(360.0 - apart) <= 1.5,
+        "at {at_angle}° instead of {angle}°"
+    );
 }
 
 #[test]
@@ -36,47 +44,54 @@ fn a_position_too_low_is_seen_where_it_is_and_a_good_path_shows_no_gouge() {
     let job = job(dir.path(), "job.toml", &[&part], more);
     let run = dir.path().join("run");
     succeed(&["run", text(&job), "-o", text(&run), "-q"]);
-    let path = run.join("path.csv");
-    let (gouge, _, within) = machined(&path, &job, &dir.path().join("good"));
-    // Facets may be 0.02 mm inside of the surface, and straight moves 0.02 mm inside of those.
+    // The run's own report tells of the surface that it leaves. Facets may be 0.02 mm inside of the designed
+    // surface, and straight moves 0.02 mm inside of those.
+    let of_run = report(&run);
+    let (gouge, _) = deepest(&of_run);
     assert!(gouge <= 0.04, "{gouge} mm");
+    let within = number(&of_run, "/machined/within_tolerance");
     assert!(within > 0.5, "{within} of the rays");
+    // Between turns 1 mm apart, 1/64 mm is left by the rim's 8 mm; somewhat more where it runs aslant.
+    let median = number(&of_run, "/machined/percentiles/median");
+    assert!((0.0..0.02).contains(&median), "{median} mm");
+    assert!(run.join("machined.svg").exists());
 
-    // Half a millimetre lower in the middle, where the cutter touches what faces it.
-    let lines: Vec<String> = std::fs::read_to_string(&path)
-        .expect("a path")
-        .lines()
-        .map(str::to_owned)
-        .collect();
-    let numbers =
-        |line: &str| -> Vec<f64> { line.split(',').filter_map(|n| n.parse().ok()).collect() };
-    let facing = |line: &String| {
-        let [_, x, angle, y, contact_x, contact_y, contact_z] = numbers(line)[..] else {
-            return false;
-        };
-        let reach = contact_y.hypot(contact_z);
-        (contact_x - x).abs() < 0.05 && (y - 48.0 - reach).abs() < 0.001 && angle > 20000.0
+    let path = run.join("path.csv");
+    let machined = |path: &Path, name: &str| {
+        let out = dir.path().join(name);
+        let args = ["--columns", "360", "--json"];
+        let told = succeed(
+            &[
+                &["machined", text(path), text(&job), "-o", text(&out)],
+                &args[..],
+            ]
+            .concat(),
+        );
+        let told: Value = serde_json::from_str(&told).expect("JSON");
+        let report = report(&out);
+        assert_eq!(told, report["machined"]);
+        for file in ["machined.ply", "machined.svg", "report.html"] {
+            assert!(out.join(file).metadata().expect("written").len() > 10_000);
+        }
+        report
     };
-    let low = (1..lines.len())
-        .find(|&k| facing(&lines[k]))
-        .expect("one that is faced");
-    let [index, x, angle, y, ..] = numbers(&lines[low])[..] else {
-        panic!("a touch: {}", lines[low]);
-    };
-    let mut lowered = lines.clone();
-    lowered[low] = format!("{index},{x},{angle},{},,,", y - 0.5);
-    let bad = dir.path().join("bad.csv");
-    std::fs::write(&bad, lowered.join("\n") + "\n").expect("writable");
-    let out = dir.path().join("bad");
-    let (gouge, [at_x, at_angle], _) = machined(&bad, &job, &out);
+    let good = machined(&path, "good");
+    // The same rays over the same path.
+    assert_eq!(good["machined"], of_run["machined"]);
+    assert_eq!(good["verification"], of_run["verification"]);
+    assert_eq!(good["path"]["positions"], of_run["path"]["positions"]);
+
+    let lowered = dir.path().join("low.csv");
+    let place = lower(&path, &lowered);
+    let bad = machined(&lowered, "bad");
+    let (gouge, at) = deepest(&bad);
     assert!((gouge - 0.5).abs() < 0.02, "{gouge} mm deep");
-    assert!((at_x - x).abs() <= 0.5, "at x {at_x} instead of {x}");
-    let apart = (at_angle - angle).rem_euclid(360.0);
-    assert!(
-        apart.min(360.0 - apart) <= 1.5,
-        "at {at_angle}° instead of {angle}°"
-    );
-    for file in ["machined.ply", "machined.svg"] {
-        assert!(out.join(file).metadata().expect("written").len() > 10_000);
-    }
+    check_at(place, at);
+    let verified = number(&bad, "/verification/normal/gouge/depth");
+    assert!((verified - 0.5).abs() < 0.02, "{verified} mm deep");
+
+    let quick = dir.path().join("quick");
+    succeed(&["run", text(&job), "-o", text(&quick), "-q", "--no-verify"]);
+    assert!(report(&quick)["machined"].is_null());
+    assert!(!quick.join("machined.svg").exists());
 }

@@ -399,3 +399,48 @@ fn opencascade_opens_the_sample() {
     let part = sample().with_file_name("last.step");
     ask("step_opens.py", &[text(&part), "3"]);
 }
+
+#[test]
+fn what_is_also_written_is_what_other_libraries_read() {
+    let dir = scratch();
+    let part = sample().with_file_name("last.step");
+    // Beyond the part, so that there are positions without contact.
+    let more = "[discretization]\ntolerance = 0.05
+[cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
+[motion]\nstep = 4.0\npoints_per_revolution = 120\nfrom = -30.0
+[output]\nalso = [\"path.npy\", \"path.parquet\", \"machined.ply\", \"machined.stl\", \"designed.ply\",
+    \"designed.stl\", \"scene.glb\"]\n";
+    let job = job(dir.path(), "job.toml", &[&part], more);
+    let out = dir.path().join("out");
+    common::succeed(&[
+        "run",
+        text(&job),
+        "-o",
+        text(&out),
+        "-q",
+        "--path-tolerance",
+        "0.05",
+    ]);
+    ask("outputs.py", &[text(&out)]);
+    let also = |name: &str, args: &[&str]| {
+        let again = dir.path().join(name);
+        let all = [&["run", text(&job), "-o", text(&again), "-q"], args].concat();
+        common::succeed(&all);
+        again
+    };
+    // Files are the same bytes however many workers there are, and nothing is written that was not asked for.
+    let again = also("again", &["--path-tolerance", "0.05", "-w", "2"]);
+    for name in [
+        "path.npy",
+        "path.parquet",
+        "machined.ply",
+        "designed.stl",
+        "scene.glb",
+    ] {
+        let [one, other] =
+            [&out, &again].map(|dir| std::fs::read(dir.join(name)).expect("written"));
+        assert!(one == other, "{name}");
+    }
+    let few = also("few", &["--no-verify", "--also", "machined.stl"]);
+    assert!(few.join("machined.stl").exists() && !few.join("scene.glb").exists());
+}

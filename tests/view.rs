@@ -7,7 +7,7 @@ mod common;
 use std::path::{Path, PathBuf};
 
 use browser::Browser;
-use common::{job, sample, scratch, succeed, text};
+use common::{job, lower, sample, scratch, succeed, text};
 use serde_json::{Value, json};
 
 const ARROW_RIGHT: char = '\u{E014}';
@@ -104,7 +104,9 @@ fn a_page_from_disk_shows_its_run() {
     // Every choice of colours is another picture and another map.
     let choices =
         browser.ask("return [...document.querySelector('#colour').options].map((o) => o.value)");
-    let expected = ["errors", "height", "speed", "bend", "rim", "extent"];
+    let expected = [
+        "errors", "machined", "height", "speed", "bend", "rim", "extent",
+    ];
     assert_eq!(choices, json!(expected));
     let mut seen = Vec::new();
     for choice in expected {
@@ -151,6 +153,7 @@ fn a_page_from_disk_shows_its_run() {
     for title in [
         "Path",
         "Held against the designed surface",
+        "The surface as machined",
         "Time",
         "Workers",
         "Extents",
@@ -189,6 +192,145 @@ fn a_gouge_is_seen() {
         "{said}"
     );
     check_looks(&browser, "gouged");
+    assert_eq!(browser.complaints(), Vec::<Value>::new());
+}
+
+/// Where the map is clearly red: how many pixels, and in their middle travel and angle.
+const RED_ON_MAP: &str = "
+    const canvas = document.querySelector('#map');
+    const { width, height } = canvas;
+    const { data } = canvas.getContext('2d').getImageData(0, 0, width, height);
+    let [count, across, down] = [0, 0, 0];
+    for (let i = 0; i < data.length; i += 4) {
+        if (data[i] < data[i + 1] + 70 || data[i] < data[i + 2] + 70) continue;
+        [count, across, down] = [count + 1, across + ((i / 4) % width), down + Math.floor(i / 4 / width)];
+    }
+    // The map's margins; a pixel of the screen is one of the picture.
+    const [left, right, top, bottom] = [46, 12, 10, 36];
+    const { rows, first, step } = JSON.parse(document.querySelector('#contents').textContent).cells;
+    const x = first[0] - step[0] / 2 + (rows * step[0] * (across / count + 0.5 - left)) / (width - left - right);
+    const angle = 360 * (1 - (down / count + 0.5 - top) / (height - top - bottom));
+    return [count, x, angle];";
+
+#[test]
+fn what_one_position_too_low_leaves_is_seen_on_the_last_and_on_the_map() {
+    let Some(browser) = Browser::start(&WITH_WEBGL) else {
+        return;
+    };
+    let dir = scratch();
+    let good = page(dir.path(), &sample());
+    let path = good.with_file_name("path.csv");
+    let lowered = dir.path().join("low.csv");
+    let [x, angle] = lower(&path, &lowered);
+    let out = dir.path().join("low");
+    succeed(&[
+        "machined",
+        text(&lowered),
+        text(&sample()),
+        "-o",
+        text(&out),
+    ]);
+    let look = |page: &Path| {
+        open(&browser, page);
+        browser.ask("document.querySelector('#show-wheel').click()");
+        let picture = browser.ask("choose('#colour', 'machined'); return picture()");
+        (picture, browser.ask(RED_ON_MAP))
+    };
+    let (_, map) = look(&good);
+    assert_eq!(map[0], 0, "nothing is gouged: {map}");
+    let (_, map) = look(&out.join("report.html"));
+    assert!(number(&map[0]) > 20.0, "{map}");
+    assert!((number(&map[1]) - x).abs() < 1.5, "{map} instead of {x} mm");
+    let apart = (number(&map[2]) - angle + 180.0).rem_euclid(360.0) - 180.0;
+    assert!(apart.abs() < 4.0, "{map} instead of {angle}°");
+
+    // On the last: a click on the map goes there, and the part turns to face the wheel; from half a turn away
+    // the place is hidden.
+    let red = |turn: f64| {
+        let go = format!(
+            "const map = document.querySelector('#map');
+            const [left, right, top, bottom] = [46, 12, 10, 36];
+            const {{ rows, first, step }} = JSON.parse(document.querySelector('#contents').textContent).cells;
+            const share = ({x} - first[0] + step[0] / 2) / (rows * step[0]);
+            const {{ x, y }} = map.getBoundingClientRect();
+            const clientX = x + left + (map.clientWidth - left - right) * share;
+            const clientY = y + top + (map.clientHeight - top - bottom) * (1 - {} / 360);
+            map.dispatchEvent(new MouseEvent('click', {{ clientX, clientY }}));
+            return picture()",
+            (angle + turn).rem_euclid(360.0)
+        );
+        number(&browser.ask(&go)["red"])
+    };
+    // The wheel's mark is reddish, too.
+    let (seen, hidden) = (red(0.0), red(180.0));
+    assert!(seen > hidden + 50.0, "{seen} and {hidden} pixels");
+    let table = browser.ask(
+        "return [...document.querySelectorAll('table')].find((t) => t.ariaLabel === 'The surface as machined').textContent",
+    );
+    let told = table.as_str().expect("text");
+    assert!(told.contains("0.49") || told.contains("0.50"), "{told}");
+    let by = browser.ask("return here(7)");
+    assert_eq!(by, "read from a file");
+    check_looks(&browser, "machined");
+    assert_eq!(browser.complaints(), Vec::<Value>::new());
+}
+
+#[test]
+fn fingers_turn_and_zoom_and_play_goes_along_the_path() {
+    let Some(browser) = Browser::start(&WITH_WEBGL) else {
+        return;
+    };
+    let dir = scratch();
+    open(&browser, &page(dir.path(), &sample()));
+    browser.screen(390, 844, "light");
+    browser.ask("document.querySelector('#show-wheel').click(); document.querySelector('#solid').scrollIntoView()");
+    let at = browser.ask(
+        "const { x, y, width, height } = document.querySelector('#solid').getBoundingClientRect();
+        return [x + width / 2, y + height / 2, window.scrollY]",
+    );
+    let [x, y, scrolled] = [0, 1, 2].map(|k| number(&at[k]));
+    let before = browser.ask("return picture()");
+
+    // One finger turns the part, and does not scroll the page.
+    browser.touch(&[[[x, y], [x + 60.0, y + 40.0]]]);
+    let turned = browser.ask("return picture()");
+    assert_ne!(turned["sum"], before["sum"]);
+    assert_eq!(browser.ask("return window.scrollY"), json!(scrolled));
+
+    // Two that go apart zoom in, two that come together out again.
+    let apart = [
+        [[x - 20.0, y], [x - 80.0, y]],
+        [[x + 20.0, y], [x + 80.0, y]],
+    ];
+    browser.touch(&apart);
+    let near = browser.ask("return picture()");
+    let covered = |picture: &Value| number(&picture["covered"]);
+    assert!(covered(&near) > 1.5 * covered(&turned), "{turned} {near}");
+    browser.touch(&apart.map(|[from, to]| [to, from]));
+    let far = browser.ask("return picture()");
+    assert!(covered(&far) < covered(&near), "{near} {far}");
+    assert_eq!(browser.ask("return window.scrollY"), json!(scrolled));
+
+    // Play goes on until it is told to stop, and stops at the end.
+    let play = |told: &str| {
+        browser.ask("document.querySelector('#play').click()");
+        let said = browser.ask(
+            "const { textContent, ariaPressed } = document.querySelector('#play'); return [textContent, ariaPressed]",
+        );
+        assert_eq!(said, json!([told, (told == "Pause").to_string()]));
+    };
+    browser.ask("choose('#at', 9000)");
+    play("Pause");
+    browser.wait("Number(here(0)) > 9020");
+    play("Play");
+    let stopped = browser.ask("return here(0)");
+    browser.ask("return picture()");
+    assert_eq!(browser.ask("return here(0)"), stopped);
+    browser.ask("choose('#at', document.querySelector('#at').max - 20)");
+    play("Pause");
+    browser.wait("document.querySelector('#play').textContent === 'Play'");
+    let end = browser.ask("return here(0) === document.querySelector('#at').max");
+    assert_eq!(end, true);
     assert_eq!(browser.complaints(), Vec::<Value>::new());
 }
 

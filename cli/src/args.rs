@@ -10,6 +10,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use horma_core::{Distribution, Simd};
+use horma_formats::also;
 use horma_formats::job::Overrides;
 use horma_formats::part::{UNIT_NAMES, Unit};
 use horma_papers::Experiment;
@@ -80,18 +81,19 @@ pub(crate) enum Command {
     Fetch(Fetch),
     /// Hold a path against the designed surface: gouges, excess, scallops
     Verify(Verify),
-    /// Show the surface that a path leaves: a mesh with its errors in colour, and a map of them
+    /// Show the surface that a path from anywhere leaves: a mesh with its errors in colour, a map of them, and the
+    /// report and page that a run has
     ///
     /// Rays go out from the spindle; on each the machined surface is where it first meets a cutter, the
-    /// designed one where it last meets a facet of the job's grid. Their difference is told along the
-    /// designed surface's normal. What lies in an undercut is not seen, nor a cross-section that does not
-    /// hold the spindle, and nothing is refused: to hold a path against the designed surface there is
-    /// `horma verify`.
+    /// designed one where it last meets a facet within 0.01 mm of the design. Their difference is told along
+    /// the designed surface's normal. What lies in an undercut is not seen, nor a cross-section that does not
+    /// hold the spindle, and nothing is refused: `horma verify` tells by its exit code whether a path is good.
     #[command(after_help = "\
 Example:
   horma machined target/last/path.csv job.toml -o target/machined
 
-Writes machined.ply (mm, part coordinates, a deviation and a colour at each corner) and machined.svg.")]
+Writes machined.ply (mm, part coordinates, a deviation and a colour at each corner), machined.svg, report.json and
+report.html; `horma view target/machined` opens it.")]
     Machined(Machined),
     /// Measure a shoe last: bottom length, centre line, ball girth, cone heel line, and what else there is
     ///
@@ -200,7 +202,7 @@ pub(crate) struct Traces {
 pub(crate) struct Run {
     #[command(flatten)]
     pub job: Job,
-    /// Directory for path.csv, the program (path.ngc), report.json, report.html and preview.png
+    /// Directory for path.csv, the program (path.ngc), report.json, report.html, machined.svg and preview.png
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     #[command(flatten)]
@@ -252,9 +254,14 @@ pub(crate) struct Machined {
     /// The job file (TOML): its part, discretization and cutter
     #[arg(value_name = "JOB")]
     pub job: PathBuf,
-    /// Directory for machined.ply and machined.svg; created if missing
+    /// Directory for machined.ply, machined.svg, report.json and report.html; created if missing
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
+    /// Do not tell how the path compares with the designed surface beside the rays
+    #[arg(long)]
+    pub no_verify: bool,
+    #[command(flatten)]
+    pub also: Also,
     /// Distance between rays along the spindle, mm
     #[arg(long, value_name = "MM", default_value_t = 0.5)]
     pub spacing: f64,
@@ -271,9 +278,34 @@ pub(crate) struct Machined {
     pub threads: Option<u16>,
 }
 
+/// What is written beside the rest.
+#[derive(Debug, Args)]
+pub(crate) struct Also {
+    /// Files to write beside the rest, for other programs: the path as path.parquet, path.npy; the surface that it
+    /// leaves as machined.ply (with its errors in colour), machined.stl; the designed one as designed.ply (with
+    /// the same colours), designed.stl; part, path and machined surface for viewers as scene.glb
+    #[arg(
+        long,
+        value_name = "FILE,...",
+        env = "HORMA_ALSO",
+        value_delimiter = ',',
+        hide_possible_values = true,
+        value_parser = PossibleValuesParser::new(also::Also::ALL.map(also::Also::name)),
+        help_heading = "Instead of the job file's"
+    )]
+    pub also: Vec<String>,
+}
+
+impl Also {
+    /// What takes the place of the job file's list, if anything is asked for.
+    pub fn overrides(&self) -> Option<Vec<String>> {
+        Some(self.also.clone()).filter(|all| !all.is_empty())
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct View {
-    /// The directory that was given to `horma run -o`
+    /// The directory that was given to `horma run -o` or `horma machined -o`
     #[arg(value_name = "DIR")]
     pub directory: PathBuf,
     /// The browser's program [default: whatever the system opens pages with]
@@ -285,7 +317,7 @@ pub(crate) struct View {
 pub(crate) struct Submit {
     #[command(flatten)]
     pub job: Job,
-    /// Directory for path.csv, the program (path.ngc), report.json, report.html and preview.png
+    /// Directory for path.csv, the program (path.ngc), report.json, report.html, machined.svg and preview.png
     #[arg(short, long, value_name = "DIR", required_unless_present = "detach")]
     pub output: Option<PathBuf>,
     /// Print the job's number and do not wait: `horma status` and `horma fetch` take it, also after
@@ -401,10 +433,12 @@ pub(crate) struct How {
     /// Show nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
-    /// Do not hold the path against the designed surface; a gouge deeper than the tolerance then goes
-    /// unnoticed
+    /// Do not hold the path against the designed surface, nor make the machined one; a gouge deeper than the
+    /// tolerance then goes unnoticed
     #[arg(long)]
     pub no_verify: bool,
+    #[command(flatten)]
+    pub also: Also,
     /// What the cutter touches: facet or point
     #[arg(
         long,
@@ -558,6 +592,7 @@ impl How {
             split: self.split,
             feed: self.feed,
             clearance: self.clearance,
+            also: self.also.overrides(),
             size: None,
             side: None,
         }

@@ -2,10 +2,7 @@
 
 use std::path::Path;
 
-use horma_core::{
-    Discretization, Frame, Interval, Last, Machined, Outline, Part, Position, Rays, Shaped, Simd,
-    discretize, place, shape,
-};
+use horma_core::{Frame, Interval, Last, Machined, Part, Shaped, place, shape};
 use horma_formats::csv;
 use horma_formats::job::{JobFile, Side};
 use horma_formats::lasts::{Lasts, figure};
@@ -13,10 +10,8 @@ use horma_formats::part::{self, Reading};
 
 use crate::args;
 use crate::error::{Error, Result};
+use crate::machined::{self, FOR_REPORT};
 use crate::{run, say, system};
-
-/// Rays for the machined last: distance along the spindle, mm, and number around it.
-const RAYS: (f64, u32) = (0.5, 360);
 
 /// Puts the last that a job speaks of into the size and onto the side that are asked for; travels that the
 /// job gives go with it.
@@ -41,49 +36,22 @@ pub(crate) fn shaped(part: &Part, file: &mut JobFile) -> Result<(Part, Option<Sh
     Ok((shaped.part.clone(), Some(shaped)))
 }
 
-/// The figures of a job's last, as machined by `positions` if there are any.
+/// The figures of a job's last, as machined if it is known what is left of it.
 pub(crate) fn figures(
     file: &JobFile,
     shaped: &Shaped,
-    positions: Option<&[Position]>,
-    threads: usize,
+    surface: Option<&Machined>,
 ) -> Result<Option<Lasts>> {
     let Some(of) = &file.last else {
         return Ok(None);
     };
-    let machined = positions.map(|positions| {
-        system::pool(threads)?.install(|| {
-            let surface = rays(&shaped.part, file, positions)?;
-            Ok::<_, Error>(of.last.machined(shaped, &surface, file.job.motion.step)?)
-        })
-    });
+    let machined = surface.map(|s| of.last.machined(shaped, s, file.job.motion.step));
     Ok(Some(Lasts::of(
         shaped,
         &of.last.frame,
         machined.transpose()?,
     )))
 }
-
-fn rays(part: &Part, file: &JobFile, positions: &[Position]) -> Result<Machined> {
-    // The designed surface is compared with, so its facets have to be fine, whatever the path was made of.
-    let fine = match file.job.discretization {
-        Discretization::Tolerance(tolerance) => tolerance.min(FINE),
-        Discretization::Grid { .. } => FINE,
-    };
-    let model = discretize(part, Discretization::Tolerance(fine))?;
-    let rays = Rays::over(Outline::span(&model.outlines), RAYS.0, RAYS.1)?;
-    let (rows, cutter) = (&model.rows, &file.job.cutter);
-    Ok(horma_core::machined(
-        rows,
-        cutter,
-        positions,
-        rays,
-        Simd::best(),
-    )?)
-}
-
-/// Chordal tolerance of the designed surface that a machined one is measured against, mm.
-const FINE: f64 = 0.01;
 
 /// Measures a last.
 pub(crate) fn measure(args: &args::Measure) -> Result<()> {
@@ -124,22 +92,23 @@ fn of_job(args: &args::Measure, job: &Path) -> Result<Lasts> {
     if overrides.side.is_none() && horma_formats::job::read(job, &overrides)?.last.is_none() {
         overrides.side = Some(Side::Right.name().to_owned());
     }
-    let run::Prepared { file, shaped, .. } = run::read(job, &overrides)?;
-    let positions = match &args.path {
+    let run::Prepared {
+        part, file, shaped, ..
+    } = run::read(job, &overrides)?;
+    let surface = match &args.path {
         None => None,
-        Some(path) => Some(
-            csv::read(path)?
-                .iter()
-                .map(csv::Row::position)
-                .collect::<Vec<_>>(),
-        ),
+        Some(path) => {
+            let positions: Vec<_> = csv::read(path)?.iter().map(csv::Row::position).collect();
+            let threads = args.threads.map_or_else(system::cores, usize::from);
+            let made = machined::surface(&part, &file, &positions, FOR_REPORT, threads)?;
+            Some(made)
+        }
     };
-    let threads = args.threads.map_or_else(system::cores, usize::from);
     if let (Some(of), Some(shaped)) = (&file.last, &shaped) {
         draw(args, &of.last, shaped)?;
     }
     let found = match &shaped {
-        Some(shaped) => figures(&file, shaped, positions.as_deref(), threads)?,
+        Some(shaped) => figures(&file, shaped, surface.as_ref())?,
         None => None,
     };
     found.ok_or(Error::MeasureNeedsJob)

@@ -11,6 +11,7 @@ mod run;
 
 mod client;
 mod cluster;
+mod examine;
 mod here;
 mod jobs;
 mod lasts;

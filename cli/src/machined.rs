@@ -1,93 +1,172 @@
-//! The machined surface of a path: computed, written, pictured and measured.
+//! The machined surface of a path: made for a run's report, and of any path by a command of its own.
 
-use horma_core::{Machined, Outline, Rays, Simd, Spot, discretize};
+use std::time::Instant;
+
+use horma_core::{
+    Counters, Discretization, Machined, Outline, Part, Position, Rays, Record, Simd, Waypoint,
+    discretize,
+};
+use horma_formats::also::{self, Also, Sources};
+use horma_formats::job::{JobFile, Overrides};
 use horma_formats::output::{self, Staging};
-use horma_formats::{map, ply};
-use serde::Serialize;
+use horma_formats::report::{self, MachinedStatistics, PathStatistics, Report};
+use horma_formats::view::Findings;
+use horma_formats::{csv, map, preview, view};
+use horma_proto::VERSION;
 
 use crate::args;
 use crate::error::Result;
-use crate::{say, system, verify};
+use crate::examine::{Subject, examine};
+use crate::{run, say, system, verify};
 
-/// What is told of a machined surface; lengths in mm.
-#[derive(Debug, Serialize)]
-struct Figures {
-    /// Rays from the spindle, and those of them that meet both surfaces.
-    rays: usize,
-    compared: usize,
-    /// Where the cutter went deepest into the designed surface, if it did.
-    deepest_gouge: Option<Spot>,
-    /// Where most is left.
-    largest_excess: Option<Spot>,
-    /// Share of the compared rays with no more than the tolerance between the two, if the job has one.
-    within_tolerance: Option<f64>,
+/// How far rays are apart.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Spacing {
+    /// Along the spindle, mm.
+    pub along: f64,
+    /// Rays around it.
+    pub columns: u32,
+    /// Whether they may be farther apart along a part that is too long for them.
+    pub or_farther: bool,
 }
 
-/// Makes the machined surface of a path from a file.
+/// What does for a report.
+pub(crate) const FOR_REPORT: Spacing = Spacing {
+    along: 0.5,
+    columns: 360,
+    or_farther: true,
+};
+
+/// Most rays that nobody asked for.
+const MOST: f64 = 1.0e6;
+
+/// Chordal tolerance of the designed surface that a machined one is measured against, mm.
+const FINE: f64 = 0.01;
+
+/// What a path leaves of a part.
+pub(crate) fn surface(
+    part: &Part,
+    file: &JobFile,
+    positions: &[Position],
+    spacing: Spacing,
+    threads: usize,
+) -> Result<Machined> {
+    // The designed surface is compared with, so its facets have to be fine, whatever the path was made of.
+    let fine = match file.job.discretization {
+        Discretization::Tolerance(tolerance) => tolerance.min(FINE),
+        Discretization::Grid { .. } => FINE,
+    };
+    system::pool(threads)?.install(|| {
+        let model = discretize(part, Discretization::Tolerance(fine))?;
+        let span = Outline::span(&model.outlines);
+        let mut along = spacing.along;
+        if spacing.or_farther {
+            along = along.max((span.high - span.low) * f64::from(spacing.columns) / MOST);
+        }
+        let rays = Rays::over(span, along, spacing.columns)?;
+        let (rows, cutter) = (&model.rows, &file.job.cutter);
+        let made = horma_core::machined(rows, cutter, positions, rays, Simd::best());
+        Ok(made?)
+    })
+}
+
+/// Makes the machined surface of a path from a file, and tells all that is found of that path.
 pub(crate) fn machined(args: &args::Machined) -> Result<()> {
-    let (part, file, positions) = verify::read(&args.path, &args.job, &args.made)?;
+    let begin = Instant::now();
+    let rows = csv::read(&args.path)?;
+    let overrides = Overrides {
+        also: args.also.overrides(),
+        ..args.made.overrides()
+    };
+    let prepared = run::read(&args.job, &overrides)?;
+    let (part, file) = (&prepared.part, &prepared.file);
     output::prepare_dir_of(&args.output, output::of_machined)?;
+    let read = run::phase("read", begin);
+    let positions: Vec<Position> = rows.iter().map(csv::Row::position).collect();
+    let subject = Subject {
+        part,
+        file,
+        shaped: prepared.shaped.as_ref(),
+        positions: &positions,
+    };
+    let rays = Some(Spacing {
+        along: args.spacing,
+        columns: args.columns,
+        or_farther: false,
+    });
     let threads = args.threads.map_or_else(system::cores, usize::from);
-    let surface = system::pool(threads)?.install(|| {
-        let model = discretize(&part, file.job.discretization)?;
-        let rays = Rays::over(Outline::span(&model.outlines), args.spacing, args.columns)?;
-        let cutter = &file.job.cutter;
-        horma_core::machined(&model.rows, cutter, &positions, rays, Simd::best())
-    })?;
-    let tolerance = verify::tolerance(&file);
-    let figures = figures(&surface, tolerance);
+    let mut phases = vec![read];
+    let begin = Instant::now();
+    let verified = if args.no_verify {
+        None
+    } else {
+        Some(verify::check(part, &file.job, &positions, None, threads)?)
+    };
+    if verified.is_some() {
+        phases.push(run::phase("verify", begin));
+    }
+    let (verification, clearances) = verified.unzip();
+    let found = examine(&subject, rays, threads, &|_| {})?;
+    phases.extend(found.phases);
+
+    let begin = Instant::now();
+    let cutter = &file.job.cutter;
+    let rim = cutter.max_radius();
+    let waypoints: Vec<Waypoint> = rows.iter().map(|row| row.waypoint(rim)).collect();
     let staging = Staging::begin_of(&args.output, output::of_machined)?;
-    ply::save(&staging.file(output::MACHINED_MESH), &surface)?;
-    map::save(&staging.file(output::MACHINED_MAP), &surface)?;
+    let sheets = preview::sheets(part);
+    let sources = Sources {
+        path: &waypoints,
+        part: &sheets,
+        machined: found.surface.as_ref(),
+    };
+    let asked = file.also.iter().filter(|a| **a != Also::MachinedPly);
+    let also: Vec<Also> = [Also::MachinedPly].iter().chain(asked).copied().collect();
+    for file in &also {
+        also::save(*file, staging.dir(), &sources)?;
+    }
+    if let Some(surface) = &found.surface {
+        map::save(&staging.file(output::MACHINED_MAP), surface)?;
+    }
+    let findings = Findings {
+        clearances: clearances.as_ref(),
+        machined: found.surface.as_ref(),
+    };
+    let seen = view::view(&sheets, cutter, &waypoints, None, findings);
+    phases.push(run::phase("write", begin));
+    let report = Report {
+        version: VERSION.to_owned(),
+        job: prepared.job,
+        files: prepared.sources,
+        warnings: prepared.warnings,
+        path: PathStatistics::of(waypoints.iter().copied(), &Counters::default()),
+        verification,
+        machined: found.machined,
+        program: None,
+        keep_outs: Vec::new(),
+        roughing: None,
+        last: found.last,
+        record: Record {
+            phases,
+            ..Record::default()
+        },
+    };
+    report::save(&staging.file(output::REPORT), &report)?;
+    view::save(&staging.file(output::VIEW), &seen, &report)?;
     staging.publish()?;
     if args.json {
-        say(&serde_json::to_string_pretty(&figures).unwrap_or_default());
-    } else {
-        say(&describe(&figures, tolerance));
-        for name in [output::MACHINED_MESH, output::MACHINED_MAP] {
-            say(&args.output.join(name).display().to_string());
-        }
+        say(&serde_json::to_string_pretty(&report.machined).unwrap_or_default());
+        return Ok(());
+    }
+    let verification = report.verification.as_ref().map(verify::describe);
+    let machined = report.machined.as_ref();
+    let machined = machined.map(MachinedStatistics::describe);
+    for told in [verification, machined].into_iter().flatten() {
+        say(&told);
+    }
+    let always = [output::MACHINED_MAP, output::REPORT, output::VIEW];
+    for name in always.into_iter().chain(also.iter().map(|a| a.name())) {
+        say(&args.output.join(name).display().to_string());
     }
     Ok(())
-}
-
-fn figures(surface: &Machined, tolerance: Option<f64>) -> Figures {
-    let compared = || surface.deviation.iter().flatten();
-    let within = |tolerance: f64| {
-        let within = compared().filter(|d| d.abs() <= tolerance).count();
-        within as f64 / compared().count().max(1) as f64
-    };
-    Figures {
-        rays: surface.rays.len(),
-        compared: compared().count(),
-        deepest_gouge: surface.deepest().filter(|spot| spot.deviation < 0.0),
-        largest_excess: surface.highest().filter(|spot| spot.deviation > 0.0),
-        within_tolerance: tolerance.map(within),
-    }
-}
-
-fn describe(figures: &Figures, tolerance: Option<f64>) -> String {
-    let spot = |name: &str, spot: &Option<Spot>| match spot {
-        None => format!("{name}: none"),
-        Some(s) => format!(
-            "{name}: {:.4} mm at x {:.3}, {:.1}°",
-            s.deviation.abs(),
-            s.x,
-            s.angle
-        ),
-    };
-    let within = figures.within_tolerance.zip(tolerance);
-    let within = within.map_or(String::new(), |(share, tolerance)| {
-        format!(
-            "\nwithin {tolerance} mm of the designed surface: {:.1} %",
-            100.0 * share
-        )
-    });
-    format!(
-        "{} rays from the spindle, {} of them meet both surfaces\n{}\n{}{within}",
-        figures.rays,
-        figures.compared,
-        spot("deepest gouge", &figures.deepest_gouge),
-        spot("largest excess", &figures.largest_excess),
-    )
 }

@@ -7,14 +7,16 @@ use std::thread;
 use std::time::Instant;
 
 use horma_core::{
-    Clearances, Counters, Job, Method, Part, Phase, Record, Shaped, Simd, ToolPath, Verification,
-    place,
+    Clearances, Counters, Job, Machined, Method, Part, Phase, Record, Shaped, Simd, ToolPath,
+    Verification, Waypoint, place,
 };
+use horma_formats::also::{self, Sources};
 use horma_formats::job::{self, JobFile, Overrides};
 use horma_formats::output::Staging;
 use horma_formats::part::{self, Assembled, Source};
 use horma_formats::report::{self, Left, PathStatistics, Report, RoughStatistics};
-use horma_formats::{csv, output, preview, view};
+use horma_formats::view::Findings;
+use horma_formats::{csv, map, output, preview, view};
 use horma_master::{Outcome, Progress};
 use horma_proto::{VERSION, trace};
 use tokio::runtime::Runtime;
@@ -25,6 +27,8 @@ use crate::args::{self, How};
 use crate::client::Remote;
 use crate::cluster::Workers;
 use crate::error::{Error, Result};
+use crate::examine::{Subject, examine};
+use crate::machined::FOR_REPORT;
 use crate::passes::Passes;
 use crate::progress::Display;
 use crate::serve::{NOTICE, runtime};
@@ -177,8 +181,9 @@ fn fetch_alone(remote: &Remote, id: u64, wait: bool, output: &Path, quiet: bool)
         job: serde_json::Value::Null,
         files: Vec::new(),
         warnings: vec![UNKNOWN.to_owned()],
-        path: PathStatistics::of(&path, &record.counters),
+        path: PathStatistics::of(path.waypoints(), &record.counters),
         verification: None,
+        machined: None,
         program: None,
         keep_outs: Vec::new(),
         roughing: None,
@@ -384,37 +389,42 @@ pub(crate) async fn carry_out(
         }
         Some(found.finish)
     };
-    let last = match shaped {
-        None => None,
-        Some(shaped) => {
-            display.tell("measure", 0, 0);
-            let begin = Instant::now();
-            let positions = (!asked.how.no_verify).then(|| passes.finish.positions());
-            let file = file.clone();
-            let measuring = tokio::task::spawn_blocking(move || {
-                lasts::figures(&file, &shaped, positions.as_deref(), threads)
-            });
-            let measuring = async { measuring.await.unwrap_or(Err(Error::Interrupted)) };
-            let found = unless(stop.clone(), measuring).await?;
-            record.phases.push(phase("measure", begin));
-            found
+    let needed = !asked.how.no_verify || file.also.iter().any(|a| a.needs_surface());
+    let examining = {
+        let (part, file, display) = (part.clone(), file.clone(), display.clone());
+        let positions = passes.finish.positions();
+        move || {
+            let subject = Subject {
+                part: &part,
+                file: &file,
+                shaped: shaped.as_ref(),
+                positions: &positions,
+            };
+            let rays = needed.then_some(FOR_REPORT);
+            let tell = |phase| display.tell(phase, 0, 0);
+            examine(&subject, rays, threads, &tell)
         }
     };
+    let examining = tokio::task::spawn_blocking(examining);
+    let examining = async { examining.await.unwrap_or(Err(Error::Interrupted)) };
+    let found = unless(stop.clone(), examining).await?;
+    record.phases.extend(found.phases);
     let (verification, clearances) = verified.unzip();
     let report = Report {
         version: VERSION.to_owned(),
         job,
         files: sources,
         warnings,
-        path: PathStatistics::of(&passes.finish, &record.counters),
+        path: PathStatistics::of(passes.finish.waypoints(), &record.counters),
         verification,
+        machined: found.machined,
         program: None,
         keep_outs: passes.raised.clone(),
         roughing: file.roughing.map(|_| RoughStatistics {
             layers: passes.layers.len() as u64,
             left,
         }),
-        last,
+        last: found.last,
         record,
     };
     let made = Made {
@@ -422,6 +432,7 @@ pub(crate) async fn carry_out(
         file,
         passes,
         clearances,
+        surface: found.surface,
     };
     let writing = || write(asked, &made, report, display, stop);
     info_span!("write").in_scope(writing)
@@ -491,6 +502,7 @@ struct Made {
     file: JobFile,
     passes: Passes,
     clearances: Option<Clearances>,
+    surface: Option<Machined>,
 }
 
 /// Writes all results, or none.
@@ -524,11 +536,21 @@ fn write(
         let looking = scope.spawn(|| {
             let sheets = preview::sheets(part);
             let drawn = preview::save(&staging.file(output::PREVIEW), &sheets, path);
-            let clearances = made.clearances.as_ref();
-            (
-                drawn,
-                view::view(&sheets, &file.job.cutter, path, clearances),
-            )
+            let waypoints: Vec<Waypoint> = path.waypoints().collect();
+            let findings = Findings {
+                clearances: made.clearances.as_ref(),
+                machined: made.surface.as_ref(),
+            };
+            let (cutter, trajectory) = (&file.job.cutter, Some(&path.trajectory));
+            let seen = view::view(&sheets, cutter, &waypoints, trajectory, findings);
+            let sources = Sources {
+                path: &waypoints,
+                part: &sheets,
+                machined: made.surface.as_ref(),
+            };
+            let mut asked = file.also.iter();
+            let also = asked.try_for_each(|a| also::save(*a, staging.dir(), &sources));
+            (drawn, seen, also)
         });
         let written = program::write(staging.dir(), passes, file, &heading)?;
         going_on()?;
@@ -537,7 +559,11 @@ fn write(
             going_on()?;
             csv::save(&staging.file(&output::rough_name(number)), &layer.path)?;
         }
-        let (drawn, seen) = looking.join().unwrap_or_else(|panic| resume_unwind(panic));
+        if let Some(surface) = &made.surface {
+            map::save(&staging.file(output::MACHINED_MAP), surface)?;
+        }
+        let (drawn, seen, also) = looking.join().unwrap_or_else(|panic| resume_unwind(panic));
+        also?;
         Ok::<_, Error>((drawn, seen, written))
     })?;
     going_on()?;
@@ -564,7 +590,7 @@ fn described(table: &serde_json::Value) -> String {
     entries.join(", ")
 }
 
-fn phase(name: &str, begin: Instant) -> Phase {
+pub(crate) fn phase(name: &str, begin: Instant) -> Phase {
     Phase {
         name: name.to_owned(),
         seconds: begin.elapsed().as_secs_f64(),
@@ -595,6 +621,9 @@ fn summarize(dir: &Path, report: &Report) {
     });
     let verification = report.verification.as_ref();
     let verification = verification.map_or(String::new(), |v| format!("\n{}", verify::describe(v)));
+    let machined = report.machined.as_ref().map_or(String::new(), |m| {
+        format!("\nas machined: {}", m.describe())
+    });
     let path = &report.path;
     let inserted = match path.inserted {
         0 => String::new(),
@@ -624,13 +653,19 @@ fn summarize(dir: &Path, report: &Report) {
         let names: Vec<String> = names.map(|n| n.display().to_string()).collect();
         (program::describe(p), names.join(" to "))
     });
+    let also = report.job["output"]["also"].as_array();
+    let also = also.into_iter().flatten().filter_map(|name| name.as_str());
+    let map = report.machined.as_ref().map(|_| output::MACHINED_MAP);
+    let files = [output::REPORT, output::PREVIEW].into_iter().chain(map);
+    let files = files.chain(also).chain([output::VIEW]);
+    let files: Vec<String> = files
+        .map(|name| dir.join(name).display().to_string())
+        .collect();
     say(&format!(
-        "{} positions{inserted}, {} without contact{beyond}{lost}{window}{verification}{rough}\n{cutting}\n{}\n{programs}\n{}\n{}\n{}",
+        "{} positions{inserted}, {} without contact{beyond}{lost}{window}{verification}{machined}{rough}\n{cutting}\n{}\n{programs}\n{}",
         path.positions,
         path.without_contact,
         dir.join(output::PATH).display(),
-        dir.join(output::REPORT).display(),
-        dir.join(output::PREVIEW).display(),
-        dir.join(output::VIEW).display(),
+        files.join("\n"),
     ));
 }

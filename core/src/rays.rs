@@ -8,7 +8,7 @@
 
 mod cut;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::cutter::Cutter;
 use crate::digitize::Digitizer;
@@ -62,7 +62,7 @@ pub struct Machined {
 }
 
 /// A place of a machined surface.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spot {
     /// How far it lies outside of the designed surface, mm; negative where it was gouged.
     pub deviation: f64,

@@ -45,6 +45,32 @@ impl Row {
             height: self.height,
         }
     }
+
+    /// The position with where a cutter touches whose rim is so many mm from its axis: where the row says, or
+    /// else where the rim comes nearest to the spindle.
+    pub fn waypoint(&self, rim: f64) -> Waypoint {
+        let touch = |height: f64| {
+            let facing = || {
+                let radians = self.angle.rem_euclid(360.0).to_radians();
+                let reach = height - rim;
+                [
+                    self.x,
+                    reach * libm::cos(radians),
+                    -reach * libm::sin(radians),
+                ]
+            };
+            Touch {
+                height,
+                contact: self.contact.unwrap_or_else(facing),
+            }
+        };
+        Waypoint {
+            index: self.index,
+            x: self.x,
+            angle: self.angle,
+            touch: self.height.map(touch),
+        }
+    }
 }
 
 /// Writes `path` to `file`: beside it first, then renamed.

@@ -5,6 +5,7 @@
 //! place of what the file says. An error names the file, the line and the key, and what would be
 //! right. Nothing is read here but the job itself; the part's files are only named.
 
+mod also;
 mod digitizing;
 mod echo;
 mod last;
@@ -27,6 +28,7 @@ pub use self::machine::Machine;
 pub use self::passes::Roughing;
 pub use self::place::Place;
 use self::raw::{At, Given, RawAxis, RawCutter, RawJob};
+use crate::also::Also;
 use crate::error::{Error, Result};
 use crate::part::{Reading, Trimmed, UNIT_NAMES, Unit};
 use crate::post::Program;
@@ -68,6 +70,8 @@ pub struct JobFile {
     pub program: Program,
     /// What the machine can do.
     pub machine: Machine,
+    /// What is written beside the path, its program and its report.
+    pub also: Vec<Also>,
     /// The last in the part, if the job speaks of one.
     pub last: Option<LastOf>,
 }
@@ -120,6 +124,8 @@ pub struct Overrides {
     pub feed: Option<f64>,
     /// `program.clearance`, mm
     pub clearance: Option<f64>,
+    /// `output.also`
+    pub also: Option<Vec<String>>,
     /// The size to be made of the last
     pub size: Option<f64>,
     /// The side to be made of the last
@@ -170,6 +176,7 @@ pub fn parse(text: &str, path: &Path, overrides: &Overrides) -> Result<JobFile> 
         cluster,
         program,
         machine: source.machine(&raw)?,
+        also: source.also(&raw)?,
         last: source.last(&raw)?,
     })
 }

@@ -19,15 +19,23 @@ pub mod output;
 mod raster;
 mod svg;
 
+pub mod also;
 pub mod apt;
+mod columns;
 pub mod csv;
+mod glb;
 pub mod map;
+mod npy;
+mod parquet;
 pub mod plot;
 pub mod ply;
 pub mod post;
 pub mod preview;
 pub mod report;
 pub mod sizes;
+mod skin;
+pub mod stl_out;
 pub mod view;
 
 pub use error::{Error, Result};
+pub use skin::Which;

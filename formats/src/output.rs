@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
+use crate::also::Also;
 use crate::error::{Error, Result};
 use crate::job::Side;
 use crate::post::Control;
@@ -71,7 +72,7 @@ pub fn rough_name(layer: usize) -> String {
 
 /// Whether a run may give a file of its output directory this name.
 fn of_run(name: &str) -> bool {
-    [PATH, REPORT, APT, PREVIEW, VIEW].contains(&name) || of_program(name) || of_rough(name)
+    [PATH, APT, PREVIEW].contains(&name) || of_program(name) || of_rough(name) || of_machined(name)
 }
 
 fn of_rough(name: &str) -> bool {
@@ -127,9 +128,9 @@ pub fn prepare_sizes(dir: &Path) -> Result<()> {
     sizes.try_for_each(|name| prepare_dir(&dir.join(name)))
 }
 
-/// Whether a machined surface may give a file of its output directory this name.
+/// Whether what is found of a path may give a file of its output directory this name.
 pub fn of_machined(name: &str) -> bool {
-    [MACHINED_MESH, MACHINED_MAP].contains(&name)
+    [REPORT, VIEW, MACHINED_MAP].contains(&name) || Also::named(name).is_some()
 }
 
 /// Whether a bench of the kernel may give a file of its output directory this name.

@@ -1,7 +1,5 @@
-//! `machined.ply`: the machined surface as triangles, each corner with its deviation from the designed
-//! surface and a colour for it; binary PLY, in part coordinates, mm.
-//!
-//! There are triangles between rays that stand next to each other, and nowhere else: ends stay open.
+//! `machined.ply`, `designed.ply`: a surface as triangles, each corner with the deviation of the machined surface
+//! from the designed one and a colour for it; binary PLY, in part coordinates, mm.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -11,48 +9,44 @@ use horma_core::Machined;
 use crate::error::Result;
 use crate::map::Scale;
 use crate::output;
+use crate::skin::{Which, skin};
 
-/// Writes the machined surface to `file`: beside it first, then renamed.
+/// Writes one of the surfaces to `file`: beside it first, then renamed.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be written.
-pub fn save(file: &Path, surface: &Machined) -> Result<()> {
-    output::write(file, |out| write(surface, out))
+pub fn save(file: &Path, surface: &Machined, which: Which) -> Result<()> {
+    output::write(file, |out| write(surface, which, out))
 }
 
-fn write(surface: &Machined, out: &mut impl Write) -> io::Result<()> {
-    // A ray's corner, numbered over those that there are.
-    let mut corners = 0_u32;
-    let corner = |radius: &Option<f64>| {
-        radius.map(|_| {
-            corners += 1;
-            corners - 1
-        })
+fn write(surface: &Machined, which: Which, out: &mut impl Write) -> io::Result<()> {
+    let name = match which {
+        Which::Designed => "designed",
+        Which::Machined => "machined",
     };
-    let numbers: Vec<Option<u32>> = surface.machined.iter().map(corner).collect();
-    let triangles = triangles(surface, &numbers);
+    let skin = skin(surface, which);
     write!(
         out,
         "ply\nformat binary_little_endian 1.0\n\
-         comment the surface as machined, mm, X along the spindle\n\
-         comment deviation: outside of the designed surface, mm, along its normal; negative where gouged\n\
-         element vertex {corners}\n\
+         comment the surface as {name}, mm, X along the spindle\n\
+         comment deviation: how far the machined surface is outside of the designed one, mm, along its normal; \
+         negative where gouged\n\
+         element vertex {}\n\
          property float x\nproperty float y\nproperty float z\nproperty float deviation\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
-        triangles.len()
+        skin.points.len(),
+        skin.triangles.len()
     )?;
     let scale = Scale::of(surface);
-    let rays = surface.machined.iter().zip(&surface.deviation).enumerate();
-    for (ray, (radius, deviation)) in rays {
-        let Some(radius) = *radius else { continue };
-        let [x, y, z] = surface.rays.point(ray, radius);
+    for (point, deviation) in skin.points.iter().zip(&skin.deviations) {
+        let [x, y, z] = *point;
         for number in [x, y, z, deviation.unwrap_or(f64::NAN)] {
             out.write_all(&(number as f32).to_le_bytes())?;
         }
         out.write_all(&scale.colour(*deviation))?;
     }
-    for triangle in triangles {
+    for triangle in skin.triangles {
         out.write_all(&[3])?;
         for corner in triangle {
             out.write_all(&corner.to_le_bytes())?;
@@ -61,33 +55,15 @@ fn write(surface: &Machined, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// The triangles between neighbouring rays, seen anticlockwise from outside.
-fn triangles(surface: &Machined, numbers: &[Option<u32>]) -> Vec<[u32; 3]> {
-    let columns = surface.rays.columns as usize;
-    let mut triangles = Vec::with_capacity(2 * numbers.len());
-    for ray in 0..numbers.len().saturating_sub(columns) {
-        let beside = ray - ray % columns + (ray + 1) % columns;
-        let [a, b, c, d] = [ray, ray + columns, beside + columns, beside].map(|ray| numbers[ray]);
-        for triangle in [[a, b, c], [a, c, d]] {
-            if let [Some(a), Some(b), Some(c)] = triangle {
-                triangles.push([a, b, c]);
-            }
-        }
-    }
-    triangles
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::map::tests::surface;
-    use horma_core::{cross, dot, sub};
 
     #[test]
-    fn a_ring_is_closed_and_faces_outward() {
-        let surface = surface();
+    fn a_corner_has_its_place_its_deviation_and_its_colour() {
         let mut file = Vec::new();
-        write(&surface, &mut file).expect("memory");
+        write(&surface(), Which::Designed, &mut file).expect("memory");
         let end = b"end_header\n";
         let header = file
             .windows(end.len())
@@ -95,25 +71,16 @@ mod tests {
             .expect("there")
             + end.len();
         let text = String::from_utf8_lossy(&file[..header]);
-        // 3 rows of 8, one ray of which meets nothing: two rings of 16 triangles without the 3 at its sides.
         assert!(
-            text.contains("element vertex 23\n") && text.contains("element face 29\n"),
+            text.contains("as designed") && text.contains("element vertex 24\nproperty"),
             "{text}"
         );
-        let (corners, faces) = file[header..].split_at(23 * 19);
-        assert_eq!(faces.len(), 29 * 13);
-        let point = |k: u32| {
-            let at = 19 * k as usize;
-            [0, 4, 8].map(|o| {
-                let bytes = corners[at + o..at + o + 4].try_into().expect("four");
-                f64::from(f32::from_le_bytes(bytes))
-            })
-        };
-        for face in faces.as_chunks::<13>().0 {
-            let k = [1, 5, 9].map(|o| u32::from_le_bytes(face[o..o + 4].try_into().expect("four")));
-            let [a, b, c] = k.map(point);
-            let normal = cross(sub(b, a), sub(c, a));
-            assert!(dot(normal, [0.0, a[1], a[2]]) > 0.0, "{k:?}");
-        }
+        let (corners, faces) = file[header..].split_at(24 * 19);
+        assert_eq!(faces.len(), 32 * 13);
+        let corner = &corners[9 * 19..10 * 19];
+        let number = |o: usize| f32::from_le_bytes(corner[o..o + 4].try_into().expect("four"));
+        assert_eq!((number(0), number(12)), (1.5, -0.5));
+        assert!((number(4).hypot(number(8)) - 10.0).abs() < 1e-5);
+        assert_eq!(corner[16..], [192, 31, 46]);
     }
 }

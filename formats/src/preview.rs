@@ -28,7 +28,7 @@ pub const CENTRE: Colour = [206, 112, 76];
 pub fn save(file: &Path, part: &[Sheet], path: &ToolPath) -> Result<()> {
     let touches = path.waypoints().map(|w| w.touch);
     let contact: Vec<_> = touches.map(|t| t.map(|t| t.contact)).collect();
-    let centre = centres(path);
+    let centre: Vec<_> = path.waypoints().map(|w| centre(&w)).collect();
     let lines = [
         Polyline {
             points: &contact,
@@ -45,16 +45,12 @@ pub fn save(file: &Path, part: &[Sheet], path: &ToolPath) -> Result<()> {
     output::write(file, |file| file.write_all(&picture))
 }
 
-/// The tool centre at each position as the part sees it: the cutter turns about the part.
-fn centres(path: &ToolPath) -> Vec<Option<Point>> {
-    let centre = |Waypoint {
-                      index, x, touch, ..
-                  }: Waypoint| {
-        let height = touch?.height;
-        let (cos, sin) = path.trajectory.direction_at(index.floor(), index.share());
-        Some([x, height * cos, -height * sin])
-    };
-    path.waypoints().map(centre).collect()
+/// The tool centre at a position as the part sees it: the cutter turns about the part.
+pub(crate) fn centre(waypoint: &Waypoint) -> Option<Point> {
+    let height = waypoint.touch?.height;
+    let radians = waypoint.angle.rem_euclid(360.0).to_radians();
+    let (cos, sin) = (libm::cos(radians), libm::sin(radians));
+    Some([waypoint.x, height * cos, -height * sin])
 }
 
 #[cfg(test)]
@@ -99,7 +95,7 @@ mod tests {
             between: Vec::new(),
         };
 
-        let centres = centres(&path);
+        let centres: Vec<_> = path.waypoints().map(|w| centre(&w)).collect();
         assert_eq!(centres[0], Some([0.0, 20.0, 0.0]));
         assert_eq!(centres[2], None);
         let [x, y, z] = centres[5].expect("touched");

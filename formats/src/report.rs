@@ -2,11 +2,14 @@
 //!
 //! Figures are taken as they come from the run's record; nothing is measured here.
 
+mod machined;
+
 use std::io::Write;
 use std::path::Path;
 
 use horma_core::{
-    Bound, Counters, MachineAxis, Peak, Raised, Record, Steady, Timing, ToolPath, Verification,
+    Bound, Counters, MachineAxis, Peak, Raised, Record, Steady, Timing, Touch, Verification,
+    Waypoint,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -16,6 +19,8 @@ use crate::lasts::Lasts;
 use crate::output;
 use crate::part::Source;
 use crate::post::Program;
+
+pub use machined::{MachinedStatistics, Percentiles};
 
 /// A run's report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,6 +38,9 @@ pub struct Report {
     pub path: PathStatistics,
     /// How the path compares with the designed surface; nothing if that was skipped.
     pub verification: Option<Verification>,
+    /// The surface that the path leaves; nothing if that was not looked at.
+    #[serde(default)]
+    pub machined: Option<MachinedStatistics>,
     /// The program for the machine; nothing if none was written.
     pub program: Option<ProgramStatistics>,
     /// What each keep-out did to the finishing pass, in the job's order.
@@ -69,21 +77,29 @@ pub struct PathStatistics {
 }
 
 impl PathStatistics {
-    /// Counts over a path, and what its search counted.
-    pub fn of(path: &ToolPath, counters: &Counters) -> Self {
-        let heights = || path.waypoints().filter_map(|w| w.touch).map(|t| t.height);
-        let inserted = path.between.len() as u64;
-        let positions = path.touches.len() as u64 + inserted;
-        let with_contact = heights().count() as u64;
-        Self {
-            positions,
-            inserted,
+    /// Counts over the positions of a path, and what its search counted.
+    pub fn of(path: impl Iterator<Item = Waypoint>, counters: &Counters) -> Self {
+        let mut counted = Self {
+            positions: 0,
+            inserted: 0,
             beyond_tolerance: counters.beyond_tolerance,
-            with_contact,
-            without_contact: positions - with_contact,
-            lowest: heights().reduce(f64::min),
-            highest: heights().reduce(f64::max),
+            with_contact: 0,
+            without_contact: 0,
+            lowest: None,
+            highest: None,
+        };
+        for Waypoint { index, touch, .. } in path {
+            counted.positions += 1;
+            counted.inserted += u64::from(index.parts() > 0);
+            let Some(Touch { height, .. }) = touch else {
+                counted.without_contact += 1;
+                continue;
+            };
+            counted.with_contact += 1;
+            counted.lowest = Some(counted.lowest.map_or(height, |low| low.min(height)));
+            counted.highest = Some(counted.highest.map_or(height, |high| high.max(height)));
         }
+        counted
     }
 }
 
@@ -263,7 +279,7 @@ pub fn save(file: &Path, report: &Report) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use horma_core::{Index, Inserted, LostAttempt, MotionKind, Phase, Touch, Trajectory};
+    use horma_core::{Index, Inserted, LostAttempt, MotionKind, Phase, ToolPath, Trajectory};
 
     use super::*;
 
@@ -287,14 +303,14 @@ mod tests {
 
     #[test]
     fn a_path_is_counted() {
-        let counted = PathStatistics::of(&path(), &Counters::default());
+        let counted = PathStatistics::of(path().waypoints(), &Counters::default());
         assert_eq!((counted.with_contact, counted.without_contact), (2, 1));
         assert_eq!((counted.lowest, counted.highest), (Some(-1.0), Some(2.5)));
         let nothing = ToolPath {
             touches: vec![None],
             ..path()
         };
-        let nothing = PathStatistics::of(&nothing, &Counters::default());
+        let nothing = PathStatistics::of(nothing.waypoints(), &Counters::default());
         assert_eq!((nothing.lowest, nothing.highest), (None, None));
         let finer = ToolPath {
             between: vec![Inserted {
@@ -306,7 +322,7 @@ mod tests {
             }],
             ..path()
         };
-        let finer = PathStatistics::of(&finer, &Counters::default());
+        let finer = PathStatistics::of(finer.waypoints(), &Counters::default());
         assert_eq!((finer.positions, finer.inserted), (4, 1));
         assert_eq!((finer.with_contact, finer.highest), (3, Some(7.0)));
     }
@@ -335,8 +351,9 @@ mod tests {
                 bodies: 1,
             }],
             warnings: vec!["last.stl: 3 edges are open".to_owned()],
-            path: PathStatistics::of(&path(), &Counters::default()),
+            path: PathStatistics::of(path().waypoints(), &Counters::default()),
             verification: None,
+            machined: None,
             program: None,
             keep_outs: Vec::new(),
             roughing: None,

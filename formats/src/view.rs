@@ -8,11 +8,12 @@ mod errors;
 mod pack;
 mod solid;
 mod thin;
+mod unrolled;
 
 use std::io::{self, Write};
 use std::path::Path;
 
-use horma_core::{Clearances, Cutter, Index, MotionKind, Point, ToolPath};
+use horma_core::{Clearances, Cutter, Index, Machined, MotionKind, Point, Trajectory, Waypoint};
 use serde::Serialize;
 
 use crate::error::Result;
@@ -23,6 +24,7 @@ use crate::report::Report;
 pub use errors::Errors;
 pub use solid::Solid;
 pub use thin::{Seen, Shown};
+pub use unrolled::{Cells, Unrolled};
 
 /// Places along the profile of a wheel.
 const PROFILE: usize = 32;
@@ -30,8 +32,8 @@ const PROFILE: usize = 32;
 /// What the page shows, thinned.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
-    /// How positions follow each other.
-    pub motion: Motion,
+    /// How positions follow each other; nothing if each has a place of its own.
+    pub motion: Option<Motion>,
     /// The wheel's profile: axial distance from its centre and radius there, mm.
     pub wheel: Vec<[f64; 2]>,
     /// The part as triangles.
@@ -40,6 +42,8 @@ pub struct View {
     pub path: Shown,
     /// How far from the designed surface the path stays; nothing if that was not looked at.
     pub errors: Option<Errors>,
+    /// The surface that the path leaves; nothing if that was not looked at.
+    pub machined: Option<Unrolled>,
 }
 
 /// What gives travel and angle of a position from its index, as [`horma_core::Trajectory`] does.
@@ -55,16 +59,26 @@ pub struct Motion {
     pub points_per_revolution: u32,
 }
 
-/// What there is to see of a path of `cutter` around `part`, and of how it was verified.
+/// What is found of a path beside its positions.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Findings<'a> {
+    /// How far from the designed surface it stays.
+    pub clearances: Option<&'a Clearances>,
+    /// What it leaves of the part.
+    pub machined: Option<&'a Machined>,
+}
+
+/// What there is to see of a path of `cutter` around `part`, and of what was found of it. Positions of a
+/// `trajectory` have their places from it, those of a path from elsewhere have their own.
 pub fn view(
     part: &[Sheet],
     cutter: &Cutter,
-    path: &ToolPath,
-    clearances: Option<&Clearances>,
+    path: &[Waypoint],
+    trajectory: Option<&Trajectory>,
+    found: Findings,
 ) -> View {
-    let trajectory = path.trajectory;
     View {
-        motion: Motion {
+        motion: trajectory.map(|trajectory| Motion {
             kind: match trajectory.kind {
                 MotionKind::Helix => "helix",
                 MotionKind::Rings => "rings",
@@ -72,11 +86,12 @@ pub fn view(
             from: trajectory.from,
             step: trajectory.step,
             points_per_revolution: trajectory.points_per_revolution,
-        },
+        }),
         wheel: profile(cutter),
         part: solid::solid(part),
         path: thin::shown(path),
-        errors: clearances.map(errors::errors),
+        errors: found.clearances.map(errors::errors),
+        machined: found.machined.map(unrolled::unrolled),
     }
 }
 
@@ -95,7 +110,7 @@ fn profile(cutter: &Cutter) -> Vec<[f64; 2]> {
 /// What the page has to know of the numbers that are packed.
 #[derive(Serialize)]
 struct Contents<'a> {
-    motion: &'a Motion,
+    motion: Option<&'a Motion>,
     wheel: &'a [[f64; 2]],
     triangles: Count,
     positions: Count,
@@ -104,6 +119,9 @@ struct Contents<'a> {
     samples: Option<Count>,
     /// Bounds of classes of clearances, mm, and how many samples are in each: one more than bounds.
     classes: Option<(&'a [f64], &'a [u64])>,
+    /// Cells of the machined surface, and what radii are counted up to, mm.
+    cells: Option<Cells>,
+    radius: f64,
     /// The box that coordinates are counted in, mm.
     low: Point,
     high: Point,
@@ -158,15 +176,21 @@ fn write(out: &mut impl Write, view: &View, report: &Report) -> io::Result<()> {
 /// Every number of the page, each kind in an element of its own.
 fn numbers(out: &mut impl Write, view: &View, report: &Report) -> io::Result<()> {
     let View {
-        part, path, errors, ..
+        part,
+        path,
+        errors,
+        machined,
+        ..
     } = view;
     let contacts = path.positions.iter().filter_map(|p| p.touch);
     let contacts = contacts.map(|t| t.contact);
     let samples = errors.iter().flat_map(|e| &e.points).copied();
     let all = part.points.iter().copied().chain(contacts).chain(samples);
     let (low, high) = pack::bounds(all);
+    let radii = machined.iter().flat_map(|m| m.radii.iter().flatten());
+    let radius = radii.copied().fold(0.0, f64::max);
     let contents = Contents {
-        motion: &view.motion,
+        motion: view.motion.as_ref(),
         wheel: &view.wheel,
         triangles: Count {
             shown: part.triangles.len() as u64,
@@ -182,6 +206,8 @@ fn numbers(out: &mut impl Write, view: &View, report: &Report) -> io::Result<()>
             of: e.of,
         }),
         classes: errors.as_ref().map(|e| (&errors::BOUNDS[..], &*e.classes)),
+        cells: machined.as_ref().map(|m| m.cells),
+        radius,
         low,
         high,
     };
@@ -196,6 +222,10 @@ fn numbers(out: &mut impl Write, view: &View, report: &Report) -> io::Result<()>
     pack::block(out, "triangles", corners.map(|c| c.to_le_bytes()))?;
     let index = |i: Index| (i.floor() as f64 + i.share()).to_le_bytes();
     pack::block(out, "index", seen().map(|p| index(p.index)))?;
+    if view.motion.is_none() {
+        pack::block(out, "travels", seen().map(|p| p.x.to_le_bytes()))?;
+        pack::block(out, "angles", seen().map(|p| p.angle.to_le_bytes()))?;
+    }
     let heights = seen().map(|p| float(p.touch.map(|t| t.height)));
     pack::block(out, "heights", heights)?;
     let touched = seen().map(|p| place(p.touch.map_or(low, |t| t.contact)));
@@ -206,6 +236,13 @@ fn numbers(out: &mut impl Write, view: &View, report: &Report) -> io::Result<()>
         pack::block(out, "samples", errors.points.iter().map(|&p| place(p)))?;
         let clearances = errors.clearances.iter().map(|&c| float(Some(c)));
         pack::block(out, "clearances", clearances)?;
+    }
+    if let Some(machined) = machined {
+        let radii = machined.radii.iter();
+        let radii = radii.map(|r| pack::part(r.unwrap_or(0.0), 0.0, radius));
+        pack::block(out, "radii", radii)?;
+        let deviations = machined.deviations.iter();
+        pack::block(out, "deviations", deviations.map(|&d| float(d)))?;
     }
     Ok(())
 }

@@ -89,6 +89,23 @@ impl Browser {
         self.post("/actions", &json!({"actions": actions}));
     }
 
+    /// Lays as many fingers on the page as there are ways, takes each from its first place to its second, and lifts
+    /// them; places are in pixels of the window.
+    pub fn touch(&self, ways: &[[[f64; 2]; 2]]) {
+        let go = |[x, y]: [f64; 2], ms: u32| json!({"type": "pointerMove", "duration": ms, "x": x.round(), "y": y.round()});
+        let finger = |(k, [from, to]): (usize, &[[f64; 2]; 2])| {
+            let (begin, end) = (go(*from, 0), go(*to, 100));
+            json!({
+                "type": "pointer",
+                "id": format!("finger{k}"),
+                "parameters": {"pointerType": "touch"},
+                "actions": [begin, {"type": "pointerDown", "button": 0}, end, {"type": "pointerUp", "button": 0}],
+            })
+        };
+        let fingers: Vec<Value> = ways.iter().enumerate().map(finger).collect();
+        self.post("/actions", &json!({"actions": fingers}));
+    }
+
     /// Makes the screen so large, and light or dark.
     pub fn screen(&self, width: u32, height: u32, scheme: &str) {
         let size =

@@ -108,6 +108,31 @@ pub fn path_of(job: &Path, dir: &Path, name: &str, args: &[&str]) -> Vec<u8> {
     std::fs::read(out.join("path.csv")).expect("a path")
 }
 
+/// Makes a path of the sample's wheel half a millimetre too low at one position in the middle, where it touches what
+/// faces it; where that is.
+pub fn lower(path: &Path, lowered: &Path) -> [f64; 2] {
+    let read = std::fs::read_to_string(path).expect("a path");
+    let mut lines: Vec<String> = read.lines().map(str::to_owned).collect();
+    let numbers =
+        |line: &str| -> Vec<f64> { line.split(',').filter_map(|n| n.parse().ok()).collect() };
+    let facing = |line: &String| {
+        let [_, x, angle, y, contact_x, contact_y, contact_z] = numbers(line)[..] else {
+            return false;
+        };
+        let reach = contact_y.hypot(contact_z);
+        (contact_x - x).abs() < 0.05 && (y - 48.0 - reach).abs() < 0.001 && angle > 20000.0
+    };
+    let low = (1..lines.len())
+        .find(|&k| facing(&lines[k]))
+        .expect("one that is faced");
+    let [index, x, angle, y, ..] = numbers(&lines[low])[..] else {
+        panic!("a touch: {}", lines[low]);
+    };
+    lines[low] = format!("{index},{x},{angle},{},,,", y - 0.5);
+    std::fs::write(lowered, lines.join("\n") + "\n").expect("writable");
+    [x, angle]
+}
+
 /// `report.json` of a directory.
 pub fn report(dir: &Path) -> serde_json::Value {
     let text = std::fs::read(dir.join("report.json")).expect("a report");

@@ -49,6 +49,7 @@ impl JobFile {
             },
             "program": program_echo(&self.program),
             "machine": machine_echo(&self.machine),
+            "output": { "also": self.also.iter().map(|a| a.name()).collect::<Vec<_>>() },
         });
         if let Some(unit) = &self.reading.unit {
             echo["part"]["units"] = json!(unit.name);

@@ -69,6 +69,8 @@ pub(super) struct RawJob {
     pub(super) program: RawProgram,
     #[serde(default)]
     pub(super) machine: RawMachine,
+    #[serde(default)]
+    pub(super) output: RawOutput,
     #[serde(default, deserialize_with = "given")]
     pub(super) last: RawLast,
     pub(super) grading: Option<Given<RawGrading>>,
@@ -225,6 +227,12 @@ pub(super) struct RawMachine {
     pub(super) turns: Option<Given<f64>>,
 }
 
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawOutput {
+    pub(super) also: Option<Given<Vec<String>>>,
+}
+
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawAxisLimits {
@@ -336,6 +344,7 @@ impl RawJob {
         put(&mut self.program.split, "split", &by.split);
         put(&mut self.program.feed, "feed", &by.feed);
         put(&mut self.program.clearance, "clearance", &by.clearance);
+        put(&mut self.output.also, "also", &by.also);
         if by.tolerance.is_some() {
             self.discretization.grid = None;
             put(

@@ -108,6 +108,20 @@ fn what_is_left_out_has_defaults() {
 }
 
 #[test]
+fn what_is_also_written_is_known_by_name_and_written_once() {
+    let with = |also: &str| format!("{SHORT}[output]\nalso = {also}\n");
+    let j = valid(&with("['scene.glb', 'path.npy', 'scene.glb']"));
+    assert_eq!(j.also, [Also::Scene, Also::PathNpy]);
+    assert!(valid(SHORT).also.is_empty());
+    let error = job(&with("['path.npz']"), &Overrides::default());
+    let error = error.expect_err("no such file").to_string();
+    assert!(
+        error.contains("\"path.npz\"") && error.contains("path.parquet, path.npy"),
+        "{error}"
+    );
+}
+
+#[test]
 fn the_place_is_shown_under_the_line() {
     let text = JOB.replacen("minor_radius = 8.0", "minor_radius = -8.0", 1);
     let error = job(&text, &Overrides::default())
@@ -550,7 +564,8 @@ fn machines_that_cannot_be_are_refused() {
 #[test]
 fn the_echo_is_a_job_again() {
     let path = JOB.replacen("step = 2", "step = 2\npath_tolerance = 0.005", 1);
-    let more = "travel = '-Z'\nangles = 'rezero'\napt = true\nsplit = { moves = 5000 }\n";
+    let more = "travel = '-Z'\nangles = 'rezero'\napt = true\nsplit = { moves = 5000 }\n\
+        [output]\nalso = ['path.npy']\n";
     let full = format!("{path}{more}{MACHINE}\n{LAST}{PASSES}");
     for text in [path.clone(), full] {
         let j = valid(&text);

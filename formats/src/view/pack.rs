@@ -30,16 +30,20 @@ pub(super) fn bounds(points: impl Iterator<Item = Point>) -> (Point, Point) {
 pub(super) fn place(p: Point, low: Point, high: Point) -> [u8; 6] {
     let mut bytes = [0; 6];
     for k in 0..3 {
-        let size = high[k] - low[k];
-        let share = if size > 0.0 {
-            (p[k] - low[k]) / size
-        } else {
-            0.0
-        };
-        let parts = (share * PARTS).round() as u16;
-        bytes[2 * k..][..2].copy_from_slice(&parts.to_le_bytes());
+        bytes[2 * k..][..2].copy_from_slice(&part(p[k], low[k], high[k]));
     }
     bytes
+}
+
+/// A number between two others, as parts of what is between them.
+pub(super) fn part(value: f64, low: f64, high: f64) -> [u8; 2] {
+    let size = high - low;
+    let share = if size > 0.0 {
+        (value - low) / size
+    } else {
+        0.0
+    };
+    ((share * PARTS).round() as u16).to_le_bytes()
 }
 
 /// An element with `value` as JSON, in which nothing can end the element.

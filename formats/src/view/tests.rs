@@ -1,4 +1,4 @@
-use horma_core::{Body, Mesh, Part, Record, Shape, Touch, Trajectory};
+use horma_core::{Body, Mesh, Part, Rays, Record, Shape, ToolPath, Touch, Trajectory};
 
 use super::*;
 use crate::preview::sheets;
@@ -42,8 +42,9 @@ fn report() -> Report {
         job: serde_json::Value::Null,
         files: Vec::new(),
         warnings: vec!["</script><script>alert(1)</script>".to_owned()],
-        path: PathStatistics::of(&path(), &record.counters),
+        path: PathStatistics::of(path().waypoints(), &record.counters),
         verification: None,
+        machined: None,
         program: None,
         keep_outs: Vec::new(),
         roughing: None,
@@ -64,9 +65,14 @@ fn bytes(page: &str, id: &str) -> Vec<u8> {
     engine.decode(element(page, id)).expect("base 64")
 }
 
-fn page(clearances: Option<&Clearances>) -> String {
+fn page(found: Findings) -> String {
+    page_of(Some(&path().trajectory), found)
+}
+
+fn page_of(trajectory: Option<&Trajectory>, found: Findings) -> String {
     let cutter = Cutter::torus(40.0, 8.0).expect("valid");
-    let view = view(&sheets(&part()), &cutter, &path(), clearances);
+    let waypoints: Vec<Waypoint> = path().waypoints().collect();
+    let view = view(&sheets(&part()), &cutter, &waypoints, trajectory, found);
     let mut page = Vec::new();
     write(&mut page, &view, &report()).expect("in memory");
     String::from_utf8(page).expect("text")
@@ -78,7 +84,10 @@ fn a_page_holds_the_numbers_that_it_was_given() {
         points: vec![[10.0, 0.0, 8.0]],
         normal: vec![-0.25],
     };
-    let page = page(Some(&clearances));
+    let page = page(Findings {
+        clearances: Some(&clearances),
+        machined: None,
+    });
     let heights: Vec<f32> = bytes(&page, "heights")
         .as_chunks()
         .0
@@ -104,7 +113,7 @@ fn a_page_holds_the_numbers_that_it_was_given() {
 
 #[test]
 fn nothing_of_a_run_becomes_part_of_the_page_and_nothing_comes_from_elsewhere() {
-    let page = page(None);
+    let page = page(Findings::default());
     assert!(!page.contains("alert(1)</script>"));
     let report: Report = serde_json::from_str(element(&page, "report")).expect("JSON");
     assert_eq!(report.warnings, self::report().warnings);
@@ -113,4 +122,49 @@ fn nothing_of_a_run_becomes_part_of_the_page_and_nothing_comes_from_elsewhere() 
         assert!(!outside.contains(from), "{from}");
     }
     assert!(!page.contains("id=\"samples\""));
+}
+
+#[test]
+fn a_page_holds_the_machined_surface() {
+    let rays = Rays {
+        from: 0.5,
+        step: 1.0,
+        rows: 2,
+        columns: 3,
+    };
+    let mut deviation = vec![Some(0.25); rays.len()];
+    deviation[4] = Some(-0.5);
+    deviation[5] = None;
+    let mut designed = vec![Some(10.0); rays.len()];
+    designed[1] = Some(20.0);
+    let machined = Machined {
+        rays,
+        designed,
+        machined: vec![Some(10.25); rays.len()],
+        deviation,
+    };
+    let page = page(Findings {
+        clearances: None,
+        machined: Some(&machined),
+    });
+    let contents: serde_json::Value =
+        serde_json::from_str(element(&page, "contents")).expect("JSON");
+    assert_eq!(contents["cells"]["rows"], 2);
+    assert_eq!(contents["cells"]["step"], serde_json::json!([1.0, 120.0]));
+    assert_eq!(contents["radius"], 20.0);
+    assert_eq!(bytes(&page, "radii")[..4], [0, 128, 255, 255]);
+    let deviations = bytes(&page, "deviations");
+    assert_eq!(deviations[16..20], (-0.5_f32).to_le_bytes());
+    assert_eq!(deviations.len(), 24);
+}
+
+#[test]
+fn positions_from_elsewhere_have_places_of_their_own() {
+    let page = page_of(None, Findings::default());
+    let contents: serde_json::Value =
+        serde_json::from_str(element(&page, "contents")).expect("JSON");
+    assert!(contents["motion"].is_null());
+    let last = |id: &str| bytes(&page, id)[8 * 8..].to_vec();
+    assert_eq!(last("travels"), 10.0_f64.to_le_bytes());
+    assert_eq!(last("angles"), 720.0_f64.to_le_bytes());
 }

@@ -1,6 +1,6 @@
 //! The path, thinned so that whatever stands out stays.
 
-use horma_core::{Index, ToolPath, Touch, Waypoint};
+use horma_core::{Index, Touch, Waypoint};
 
 /// Most positions that are shown.
 pub(super) const MOST: usize = 240_000;
@@ -25,6 +25,10 @@ pub struct Shown {
 pub struct Seen {
     /// Its name.
     pub index: Index,
+    /// Travel along the spindle, mm.
+    pub x: f64,
+    /// Unwound angle, degrees.
+    pub angle: f64,
     /// Where the cutter touches.
     pub touch: Option<Touch>,
     /// By how much the tool centre rises towards the next position, mm per degree.
@@ -34,24 +38,27 @@ pub struct Seen {
 }
 
 /// The positions of a path that are shown.
-pub(super) fn shown(path: &ToolPath) -> Shown {
+pub(super) fn shown(path: &[Waypoint]) -> Shown {
     thinned(&seen(path), MOST)
 }
 
-fn seen(path: &ToolPath) -> Vec<Seen> {
-    let all: Vec<Waypoint> = path.waypoints().collect();
+fn seen(all: &[Waypoint]) -> Vec<Seen> {
+    // A path from elsewhere may stand still.
+    let finite = |rate: f64| rate.is_finite().then_some(rate);
     let slope = |i: usize| {
         let (from, to) = (all.get(i)?, all.get(i + 1)?);
         let rise = to.touch?.height - from.touch?.height;
-        Some(rise / (to.angle - from.angle))
+        finite(rise / (to.angle - from.angle))
     };
     let bend = |i: usize| {
         let before = i.checked_sub(1)?;
         let turned = 0.5 * (all.get(i + 1)?.angle - all[before].angle);
-        Some((slope(i)? - slope(before)?) / turned)
+        finite((slope(i)? - slope(before)?) / turned)
     };
     let seen = all.iter().enumerate().map(|(i, w)| Seen {
         index: w.index,
+        x: w.x,
+        angle: w.angle,
         touch: w.touch,
         slope: slope(i),
         bend: bend(i),
@@ -98,14 +105,14 @@ fn outstanding(run: &[Seen]) -> impl Iterator<Item = Seen> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use horma_core::{MotionKind, Trajectory};
+    use horma_core::{MotionKind, ToolPath, Trajectory};
 
-    fn path(heights: &[Option<f64>]) -> ToolPath {
+    fn path(heights: &[Option<f64>]) -> Vec<Waypoint> {
         let touch = |height| Touch {
             height,
             contact: [0.0; 3],
         };
-        ToolPath {
+        let path = ToolPath {
             trajectory: Trajectory {
                 kind: MotionKind::Helix,
                 from: 0.0,
@@ -115,7 +122,8 @@ mod tests {
             },
             touches: heights.iter().map(|h| h.map(touch)).collect(),
             between: Vec::new(),
-        }
+        };
+        path.waypoints().collect()
     }
 
     #[test]

@@ -41,16 +41,23 @@ const rim = path.travels.map((x, i) => (Number.isNaN(path.heights[i]) ? NaN : pa
 
 const choices = [];
 
+/// A choice of colours for deviations from the designed surface. What is cut as it should be fills the colours;
+/// hollows that no wheel enters would take all of them.
+function deviations(id, name, on, values, deepest, median) {
+  const scallop = report.verification?.scallop.predicted ?? 0;
+  const limit = Math.max(deepest, 1.5 * scallop, 3 * median, 1e-4);
+  const [low, high] = range(values);
+  const scale = { low: -limit, high: limit, ramp: DIVERGING, unit: "mm", beyond: low < -limit || high > limit };
+  choices.push({ id, name, on, values, scale, ends: ["gouge", "excess"] });
+}
+
 if (surface.clearances?.length) {
-  const { normal: { gouge, excess }, scallop } = report.verification;
-  // What is cut as it should be fills the colours; hollows that no wheel enters would take all of them.
-  const limit = Math.max(gouge?.depth ?? 0, 1.5 * (scallop.predicted ?? 0), 3 * (excess?.median ?? 0), 1e-4);
-  const [low, high] = range(surface.clearances);
-  choices.push({
-    id: "errors", name: "gouge and excess of the surface", values: surface.clearances, on: "surface",
-    scale: { low: -limit, high: limit, ramp: DIVERGING, unit: "mm", beyond: low < -limit || high > limit },
-    ends: ["gouge", "excess"],
-  });
+  const { gouge, excess } = report.verification.normal;
+  deviations("errors", "gouge and excess of the surface", "surface", surface.clearances, gouge?.depth ?? 0, excess?.median ?? 0);
+}
+if (machined) {
+  const { deepest_gouge: deepest, percentiles } = report.machined;
+  deviations("machined", "the surface as machined", "rays", machined.deviations, -(deepest?.deviation ?? 0), percentiles?.median ?? 0);
 }
 choices.push(
   { id: "height", name: "tool centre", values: path.heights, on: "path", scale: scale(path.heights, "mm", false) },

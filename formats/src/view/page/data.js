@@ -32,6 +32,14 @@ function points(id) {
 const part = { points: points("vertices"), triangles: unpack("triangles", Uint32Array) };
 const surface = { points: points("samples"), clearances: unpack("clearances", Float32Array) };
 
+/// The machined surface in cells of travel and angle: how far the designed one is from the spindle, and how far
+/// the machined one lies outside of it.
+const machined = contents.cells && {
+  ...contents.cells,
+  radii: Float32Array.from(unpack("radii", Uint16Array), (n) => (contents.radius * n) / 65535),
+  deviations: unpack("deviations", Float32Array),
+};
+
 /// The path: a number of each kind for each position that is shown.
 const path = {
   index: unpack("index", Float64Array),
@@ -41,8 +49,9 @@ const path = {
   bends: unpack("bends", Float32Array),
 };
 path.length = path.index.length;
-path.angles = path.index.map((i) => (360 * i) / contents.motion.points_per_revolution);
-path.travels = path.index.map(travel);
+// Positions from elsewhere have places of their own.
+path.angles = unpack("angles", Float64Array) ?? path.index.map((i) => (360 * i) / contents.motion.points_per_revolution);
+path.travels = unpack("travels", Float64Array) ?? path.index.map(travel);
 
 /// Travel at a position, mm; between rings it goes from the one to the next on the last move of each.
 function travel(index) {
@@ -66,6 +75,9 @@ function extentOf(index) {
   }
   return low;
 }
+
+/// An angle within one turn.
+const around = (angle) => ((angle % 360) + 360) % 360;
 
 /// Least and greatest of numbers, those that are none left out.
 function range(numbers) {

@@ -48,12 +48,33 @@ function wheel(profile) {
 function centres() {
   const all = new Float32Array(3 * path.length);
   for (let i = 0; i < path.length; i++) {
-    const angle = (path.angles[i] % 360) * (Math.PI / 180);
+    const angle = around(path.angles[i]) * (Math.PI / 180);
     all[3 * i] = path.travels[i];
     all[3 * i + 1] = path.heights[i] * Math.cos(angle);
     all[3 * i + 2] = -path.heights[i] * Math.sin(angle);
   }
   return all;
+}
+
+/// The designed surface where the rays end: a point for each cell, joined to those beside it where the machined one
+/// is known.
+function shell({ rows, columns, first, step, radii, deviations }) {
+  const points = new Float32Array(3 * radii.length);
+  radii.forEach((radius, i) => {
+    const angle = (first[1] + step[1] * (i % columns)) * (Math.PI / 180);
+    points.set([first[0] + step[0] * Math.floor(i / columns), radius * Math.cos(angle), -radius * Math.sin(angle)], 3 * i);
+  });
+  const triangles = new Uint32Array(6 * (rows - 1) * columns);
+  let count = 0;
+  const known = (corner) => !Number.isNaN(deviations[corner]);
+  for (let a = 0; a < (rows - 1) * columns; a++) {
+    const b = a - (a % columns) + ((a + 1) % columns);
+    const [c, d] = [a + columns, b + columns];
+    if (!(known(a) && known(b) && known(c) && known(d))) continue;
+    triangles.set([a, b, c, b, d, c], count);
+    count += 6;
+  }
+  return { points, triangles: triangles.subarray(0, count) };
 }
 
 /// The order in which positions are joined, interrupted where nothing is touched.

@@ -99,12 +99,12 @@ function tell(i) {
   const pairs = [
     ["position", rough(path.index[i], 12)],
     ["travel", `${fixed(path.travels[i], 3)} mm`],
-    ["angle", `${fixed(path.angles[i] % 360, 2)}°`],
+    ["angle", `${fixed(around(path.angles[i]), 2)}°`],
     ["turn", count.format(Math.floor(path.angles[i] / 360) + 1)],
     ["tool centre", touching ? `${fixed(path.heights[i], 3)} mm` : "no contact"],
     ["touches ahead by", touching ? `${fixed(rim[i], 2)} mm` : "–"],
     ["axis speed", `${fixed(path.slopes[i] * 6 * state.turns, 1)} mm/s`],
-    ["digitized by", extent ? `${extent.worker}, extent ${extent.extent}` : "this process"],
+    ["digitized by", extent ? `${extent.worker}, extent ${extent.extent}` : contents.motion ? "this process" : "read from a file"],
   ];
   const list = $("#here");
   if (!list.children.length) {
@@ -128,9 +128,12 @@ function describe() {
   });
   $("#axis").ariaLabel = `The attack axis over time. ${rows.join("; ")}`;
   $("#motion-note").textContent = motionNote();
-  $("#map-note").textContent = choice.on === "surface"
-    ? "Each place shows the sample that strays most there, at the angle at which it faces the wheel. Click to go there."
-    : "Each place shows the position that stands out most there. Click to go there.";
+  const shows = {
+    surface: "the sample that strays most there, at the angle at which it faces the wheel",
+    rays: "how far the machined surface lies outside of the designed one, along its normal, where a ray from the spindle meets both",
+    path: "the position that stands out most there",
+  };
+  $("#map-note").textContent = `Each place shows ${shows[choice.on]}. Click to go there.`;
 }
 
 function motionNote() {
@@ -149,7 +152,10 @@ function shownNote() {
     : "";
   const thinner = samples && samples.shown < samples.of ? ", of those in a row the one that strays most" : "";
   const sampled = samples ? `; ${of(samples)} samples of the surface${thinner}` : "";
-  return `Shown are ${of(positions)} positions${rule}; ${of(triangles)} triangles of the part${sampled}. Lengths are in mm. ` +
+  const cells = machined && machined.rows * machined.columns;
+  const strayed = machined && cells < machined.rays ? ", of those beside each other the one that strays most" : "";
+  const met = machined ? `; ${of({ shown: cells, of: machined.rays })} rays that end at the machined surface${strayed}` : "";
+  return `Shown are ${of(positions)} positions${rule}; ${of(triangles)} triangles of the part${sampled}${met}. Lengths are in mm. ` +
     "Figures and the histogram count everything.";
 }
 

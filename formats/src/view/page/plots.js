@@ -31,18 +31,22 @@ function words(pen, text, x, y, align = "left", baseline = "alphabetic") {
 
 // The unrolled map.
 
+/// Step and points per revolution: the path's, or those of the job that it is held against.
+const motion = contents.motion ?? report.job.motion;
+
 const MAP = { left: 46, right: 12, top: 10, bottom: 36 };
 
 /// Values in cells of travel and angle: in each the one farthest from the middle of the colours, so
 /// that nothing outstanding is lost.
 function unroll(choice) {
+  if (choice.on === "rays") return unrolled(machined);
   const errors = choice.on === "surface";
   const [low, high] = range(errors ? surface.points.filter((_, i) => i % 3 === 0) : path.travels);
   const cell = errors
     ? Math.max(1.6 * report.verification.spacing, (high - low) / 480)
-    : Math.max(contents.motion.step, (high - low) / 480);
+    : Math.max(motion.step, (high - low) / 480);
   const columns = Math.max(1, Math.floor((high - low) / cell) + 1);
-  const rows = errors ? 120 : Math.min(180, contents.motion.points_per_revolution);
+  const rows = errors ? 120 : Math.min(180, motion.points_per_revolution);
   const cells = new Float32Array(columns * rows).fill(NaN);
   const middle = choice.scale ? (choice.scale.low + choice.scale.high) / 2 : 0;
   choice.values.forEach((value, i) => {
@@ -51,11 +55,19 @@ function unroll(choice) {
       // Where the surface faces the wheel.
       ? [surface.points[3 * i], -Math.atan2(surface.points[3 * i + 2], surface.points[3 * i + 1]) * (180 / Math.PI)]
       : [path.travels[i], path.angles[i]];
-    const row = Math.floor(((((angle % 360) + 360) % 360) / 360) * rows) % rows;
+    const row = Math.floor((around(angle) / 360) * rows) % rows;
     const at = row * columns + Math.floor((x - low) / cell);
     if (Number.isNaN(cells[at]) || Math.abs(value - middle) > Math.abs(cells[at] - middle)) cells[at] = value;
   });
   return { low, high: low + columns * cell, columns, rows, cells: errors ? filled(cells, columns) : cells };
+}
+
+/// The cells of the machined surface as they are, travel by travel.
+function unrolled({ rows, columns, first, step, deviations }) {
+  const cells = new Float32Array(deviations.length);
+  deviations.forEach((value, i) => (cells[(i % columns) * rows + Math.floor(i / columns)] = value));
+  const low = first[0] - step[0] / 2;
+  return { low, high: low + rows * step[0], columns: rows, rows: columns, cells };
 }
 
 /// Where the surface comes near the spindle its samples are too few for every cell: one without takes
@@ -100,7 +112,7 @@ function drawMap(canvas, map, position, theme) {
   for (const x of ticks(map.low, map.high, area.w / 80)) words(pen, rough(x, 6), across(x), area.y + area.h + 15, "center");
   for (const angle of [0, 90, 180, 270, 360]) words(pen, `${angle}°`, area.x - 6, down(angle), "right", "middle");
   words(pen, "travel, mm", area.x + area.w, height - 4, "right");
-  const angle = path.angles[position] % 360;
+  const angle = around(path.angles[position]);
   pen.strokeStyle = theme.text;
   pen.beginPath();
   pen.moveTo(across(path.travels[position]), area.y);
@@ -118,7 +130,7 @@ function onMap(canvas, map, { offsetX, offsetY }) {
   const angle = 360 * (1 - (offsetY - MAP.top) / h);
   let [best, least] = [0, Infinity];
   for (let i = 0; i < path.length; i++) {
-    const turned = Math.abs(((path.angles[i] - angle + 540) % 360) - 180);
+    const turned = Math.abs(around(path.angles[i] - angle + 180) - 180);
     const far = Math.abs(path.travels[i] - x) / (map.high - map.low) + turned / 360;
     if (far < least) [best, least] = [i, far];
   }

@@ -59,6 +59,7 @@ function scene(canvas) {
   const order = strip();
   const lines = { contacts: lineBuffers(gl, path.contacts, order), centres: lineBuffers(gl, centres(), order) };
   const samples = surface.points && cloud(gl, surface);
+  const left = machined && shellBuffers(gl, shell(machined));
   let coloured = null;
   let camera = structuredClone(HOME);
   const box = extent();
@@ -68,6 +69,7 @@ function scene(canvas) {
     coloured = choice;
     const all = colours(choice);
     if (choice.on === "surface") samples.colour(all);
+    else if (choice.on === "rays") left.colour(all);
     else for (const line of Object.values(lines)) line.colour(all);
   }
 
@@ -89,7 +91,7 @@ function scene(canvas) {
     gl.uniformMatrix3fv(at.view, false, [...right, ...up, ...out]);
     gl.uniform3fv(at.centre, centre);
     gl.uniform3f(at.zoom, (2 * scale) / width, (2 * scale) / height, 1 / box.deep);
-    const angle = (path.angles[position] % 360) * (Math.PI / 180);
+    const angle = around(path.angles[position]) * (Math.PI / 180);
     const turned = [Math.cos(angle), Math.sin(angle)];
     gl.uniform2fv(at.turn, turned);
     gl.uniform3f(at.shift, 0, 0, 0);
@@ -101,14 +103,14 @@ function scene(canvas) {
       gl.uniform1f(at.size, size);
     };
     colourBy(choice);
-    const errors = choice.on === "surface";
+    const errors = choice.on !== "path";
     if (show.part) {
       set(true, 0);
       paint(errors ? [226, 222, 216] : theme.part);
       solid.draw();
       if (errors) {
-        // Samples tint what is lit below them, each place once and the worst first.
-        set(false, LIFT, Math.max(1.5, 1.7 * scale * report.verification.spacing));
+        // Errors tint what is lit below them, each place once; of samples the worst first.
+        set(false, LIFT, Math.max(1.5, 1.7 * scale * (report.verification?.spacing ?? 0)));
         ownColours();
         gl.enable(gl.BLEND);
         gl.blendFunc(gl.DST_COLOR, gl.ZERO);
@@ -116,7 +118,7 @@ function scene(canvas) {
         gl.stencilFunc(gl.EQUAL, 0, 255);
         gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
         gl.depthMask(false);
-        samples.draw();
+        (choice.on === "rays" ? left : samples).draw();
         gl.depthMask(true);
         gl.disable(gl.STENCIL_TEST);
         gl.disable(gl.BLEND);
@@ -246,6 +248,18 @@ function lineBuffers(gl, points, order) {
     dot(i) {
       gl.bindVertexArray(array);
       gl.drawArrays(gl.POINTS, i, 1);
+    },
+  };
+}
+
+function shellBuffers(gl, { points, triangles }) {
+  const { array, colour } = tinted(gl, points);
+  indices(gl, triangles);
+  return {
+    colour,
+    draw() {
+      gl.bindVertexArray(array);
+      gl.drawElements(gl.TRIANGLES, triangles.length, gl.UNSIGNED_INT, 0);
     },
   };
 }

@@ -57,7 +57,7 @@ function pathTable({ positions, inserted, beyond_tolerance, without_contact, low
 
 function deviationTable({ normal, attack }) {
   const row = (name, of) => [name, of(normal), of(attack)];
-  const where = (gouge) => (gouge ? `${fixed(gouge.x, 2)} mm, ${fixed(gouge.angle % 360, 1)}°` : "–");
+  const where = (gouge) => (gouge ? `${fixed(gouge.x, 2)} mm, ${fixed(around(gouge.angle), 1)}°` : "–");
   const depth = (gouge) => (gouge ? mm(gouge.depth, 4) : "none");
   return table("Held against the designed surface", ["", "along the normal", "along the attack axis"], [
     row("deepest gouge", (d) => depth(d.gouge)),
@@ -68,6 +68,21 @@ function deviationTable({ normal, attack }) {
     row("excess, 99 % within", (d) => mm(d.excess?.p99, 4)),
     row("largest excess", (d) => mm(d.excess?.max, 4)),
   ], "broad");
+}
+
+function machinedTable({ rays, compared, spacing, columns, deepest_gouge, largest_excess, percentiles, tolerance, within_tolerance }) {
+  const spot = (s) => (s ? `${mm(Math.abs(s.deviation), 4)} at ${fixed(s.x, 2)} mm, ${fixed(s.angle, 1)}°` : "none");
+  const ranks = percentiles ? Object.entries(percentiles) : [];
+  return table("The surface as machined", [], [
+    ["deepest below the designed surface", spot(deepest_gouge)],
+    ["most above it", spot(largest_excess)],
+    ...ranks.map(([name, value]) => [name === "median" ? "median" : `${name.slice(1)} % are not above`, mm(value, 4)]),
+    ...(within_tolerance === null ? [] : [[`within ${rough(tolerance)} mm`, percent(within_tolerance)]]),
+    ["rays that meet both", whole(compared)],
+    ["rays in all", whole(rays)],
+    ["rays around the spindle", whole(columns)],
+    ["from ray to ray along it", mm(spacing)],
+  ]);
 }
 
 function samplesTable({ samples, spacing, positions, moves, never_reached, scallop }) {
@@ -139,13 +154,14 @@ const spaced = (key) => key.replaceAll("_", " ");
 
 /// All tables, what matters most first; the narrow ones are in columns.
 function tables() {
-  const { version, job, warnings, path: figures, verification, phases, bodies, extents, lost, second, counters, traffic, window, workers, extents_from_journal, program, ...others } = report;
+  const { version, job, warnings, path: figures, verification, machined: left, phases, bodies, extents, lost, second, counters, traffic, window, workers, extents_from_journal, program, ...others } = report;
   const all = [pathTable(figures)];
   if (warnings.length) all.unshift(table("Warnings", [], warnings.map((w) => [w])));
   if (verification) all.push(deviationTable(verification), samplesTable(verification));
+  if (left) all.push(machinedTable(left));
   if (program) all.push(...programTables(program));
   for (const [name, value] of Object.entries(others)) if (value) all.push(plain(spaced(name), value));
-  all.push(phasesTable(phases), bodiesTable(bodies), plain("What the search cost", counters));
+  all.push(phasesTable(phases), ...(bodies.length ? [bodiesTable(bodies)] : []), ...(contents.motion ? [plain("What the search cost", counters)] : []));
   if (window) all.push(plain("Windows of the local search", window));
   if (traffic) all.push(plain("Traffic", traffic));
   if (workers.length) all.push(table("Workers", ["name", "address"], workers.map((w) => [w.worker, w.address])));
