@@ -407,7 +407,7 @@ fn what_is_also_written_is_what_other_libraries_read() {
     // Beyond the part, so that there are positions without contact.
     let more = "[discretization]\ntolerance = 0.05
 [cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
-[motion]\nstep = 4.0\npoints_per_revolution = 120\nfrom = -30.0
+[motion]\nstep = 8.0\npoints_per_revolution = 120\nfrom = -80.0
 [output]\nalso = [\"path.npy\", \"path.parquet\", \"machined.ply\", \"machined.stl\", \"designed.ply\",
     \"designed.stl\", \"scene.glb\"]\n";
     let job = job(dir.path(), "job.toml", &[&part], more);
