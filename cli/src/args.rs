@@ -3,11 +3,10 @@
 mod last;
 
 use std::fmt;
-use std::io::stdout;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{ArgGroup, Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use horma_core::{Distribution, Simd};
 use horma_formats::also;
@@ -16,6 +15,7 @@ use horma_formats::part::{UNIT_NAMES, Unit};
 use horma_papers::Experiment;
 
 pub(crate) use self::last::{Made, Measure, Sizes};
+use crate::progress::Audience;
 use crate::traces::{self, Collector};
 
 const AFTER_HELP: &str = "\
@@ -172,6 +172,14 @@ Writes papers.md, papers.html (one file, diagrams and all) and the diagrams of p
         /// bash, zsh, fish, elvish or powershell
         shell: Shell,
     },
+    /// Write manual pages: horma.1, and one for each command
+    #[command(after_help = "\
+Example:
+  horma man ~/.local/share/man/man1         then `man horma`, `man horma-run`")]
+    Man {
+        /// Where to write; created if missing
+        directory: PathBuf,
+    },
 }
 
 impl Command {
@@ -203,8 +211,15 @@ pub(crate) struct Run {
     #[command(flatten)]
     pub job: Job,
     /// Directory for path.csv, the program (path.ngc), report.json, report.html, machined.svg and preview.png
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
+    #[arg(short, long, value_name = "DIR", required_unless_present = "dry_run")]
+    pub output: Option<PathBuf>,
+    /// Tell what would be done, and write nothing: positions, grids, memory, what each worker would get,
+    /// and how long digitizing would take, by a few positions that are tried
+    #[arg(long, conflicts_with_all = ["sizes", "sides", "watch"])]
+    pub dry_run: bool,
+    /// Run it again whenever the job file or a part file changes, until interrupted
+    #[arg(long)]
+    pub watch: bool,
     #[command(flatten)]
     pub sizes: Sizes,
     /// Worker processes on this machine; 0 computes in this process
@@ -433,6 +448,10 @@ pub(crate) struct How {
     /// Show nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
+    /// Tell other programs what happens: JSON on standard output, a line for each event, which names it
+    /// (phase, progress, phase_done, warning, note, done, failed, ...)
+    #[arg(long, conflicts_with = "quiet")]
+    pub json: bool,
     /// Do not hold the path against the designed surface, nor make the machined one; a gouge deeper than the
     /// tolerance then goes unnoticed
     #[arg(long)]
@@ -571,6 +590,15 @@ pub(crate) struct How {
 }
 
 impl How {
+    /// To whom it is told how the job goes on.
+    pub fn audience(&self) -> Audience {
+        if self.json {
+            Audience::Programs
+        } else {
+            Audience::unless(self.quiet)
+        }
+    }
+
     /// What goes over the job file.
     pub fn overrides(&self, workers: Option<u32>) -> Overrides {
         Overrides {
@@ -897,8 +925,4 @@ pub(crate) struct Joining {
     pub insecure: bool,
     #[command(flatten)]
     pub tls: Tls,
-}
-
-pub(crate) fn print_completions(shell: Shell) {
-    clap_complete::generate(shell, &mut Arguments::command(), "horma", &mut stdout());
 }

@@ -23,7 +23,7 @@ use horma_formats::{plot as diagram, sample};
 
 use crate::args::BenchKernel;
 use crate::error::Result;
-use crate::progress::Display;
+use crate::progress::{Audience, Display};
 use crate::{run, say};
 use measure::Subject;
 pub(crate) use scaling::scaling;
@@ -31,7 +31,7 @@ use turns::Effort;
 
 /// Measures, prints the table and writes the results.
 pub(crate) fn kernel(args: &BenchKernel) -> Result<()> {
-    let display = Display::new(args.quiet);
+    let display = Display::new(Audience::unless(args.quiet));
     let measured = measure_and_write(args, &display);
     display.finish();
     say(measured?.trim_end());
@@ -96,7 +96,7 @@ fn read(
                 ..
             } = run::read(path, overrides)?;
             for warning in warnings {
-                display.note(&format!("warning: {warning}"));
+                display.warn(&warning);
             }
             let name = names(&file);
             (file, name, part)

@@ -132,6 +132,13 @@ pub(crate) enum Error {
     MeasureNeedsJob,
     #[error("{name}: {source}; none of the others is written either")]
     OfSize { name: String, source: Box<Self> },
+    #[error("cannot watch the job's files: {0}")]
+    Watch(String),
+    #[error("{}: the manual cannot be written: {source}", directory.display())]
+    Manual {
+        directory: PathBuf,
+        source: std::io::Error,
+    },
     #[error("cannot start threads: {0}")]
     Threads(String),
     #[error("interrupted")]
@@ -185,6 +192,7 @@ impl Error {
             | Self::NothingToView { .. }
             | Self::MeasureNeedsJob
             | Self::Traces(_)
+            | Self::Manual { .. }
             | Self::Unfit { here: true, .. }
             | Self::Worker(
                 horma_worker::Error::Address { .. }
@@ -200,6 +208,7 @@ impl Error {
             | Self::BadReply { .. }
             | Self::Certs(_)
             | Self::Metrics(_)
+            | Self::Watch(_)
             | Self::Unfit { here: false, .. }
             | Self::Threads(_) => 4,
             Self::Interrupted => 130,

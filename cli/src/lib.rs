@@ -12,6 +12,7 @@ mod run;
 mod client;
 mod cluster;
 mod examine;
+mod forecast;
 mod here;
 mod jobs;
 mod lasts;
@@ -20,12 +21,14 @@ mod sizes;
 mod submit;
 mod tls;
 mod verify;
+mod watch;
 
 mod bench;
 mod certs;
 mod doctor;
 mod http;
 mod inspect;
+mod manual;
 mod papers;
 mod reach;
 mod serve;
@@ -99,7 +102,6 @@ fn exit_code(ended: Result<()>) -> ExitCode {
 
 fn execute(arguments: Arguments) -> Result<()> {
     match arguments.command {
-        Command::Run(run) if run.sizes.asked() => info_span!("run").in_scope(|| sizes::run(&run)),
         Command::Run(run) => info_span!("run").in_scope(|| run::run(&run)),
         Command::Submit(submit) => info_span!("submit").in_scope(|| run::submit(&submit)),
         Command::Status(args) => jobs::status(&args),
@@ -119,9 +121,10 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Bench(args::Bench::Scaling(bench)) => bench::scaling(&bench),
         Command::Papers(args) => papers::papers(&args),
         Command::Completions { shell } => {
-            args::print_completions(shell);
+            manual::completions(shell);
             Ok(())
         }
+        Command::Man { directory } => manual::pages(&directory),
     }
 }
 

@@ -1,13 +1,79 @@
-//! Progress: a bar for each phase on a terminal, plain lines elsewhere, nothing if quiet.
+//! What is told while a command works: on standard error a bar for each phase on a terminal and plain
+//! lines elsewhere; or events for other programs, JSON, one a line, on standard output; or nothing.
 
-use std::io::{IsTerminal, Write, stderr};
+use std::io::{IsTerminal, Write, stderr, stdout};
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use serde::Serialize;
+
+use crate::error::Error;
 
 /// How often plain lines tell of a phase that takes long.
 const LINE_EVERY: Duration = Duration::from_secs(5);
+
+/// How often events do.
+const EVENT_EVERY: Duration = Duration::from_millis(200);
+
+/// To whom it is told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Audience {
+    /// Whoever looks at the terminal.
+    People,
+    /// Whoever reads standard output, line by line.
+    Programs,
+    Nobody,
+}
+
+/// What a program is told. The names are a contract: they are added to, not changed.
+#[derive(Debug, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub(crate) enum Event<'a> {
+    /// A phase has begun; the one before it has ended.
+    Phase {
+        name: &'a str,
+    },
+    /// Positions done so far in the phase, and of how many.
+    Progress {
+        name: &'a str,
+        done: u64,
+        total: u64,
+    },
+    /// A phase has ended.
+    PhaseDone {
+        name: &'a str,
+        seconds: f64,
+    },
+    Warning {
+        text: &'a str,
+    },
+    Note {
+        text: &'a str,
+    },
+    /// A master has taken the job in.
+    Submitted {
+        job: u64,
+    },
+    /// All files are in place.
+    Done {
+        directory: &'a Path,
+    },
+    /// Nothing is; the text is what standard error says too.
+    Failed {
+        exit_code: u8,
+        text: &'a str,
+    },
+    /// The run is over, and begins again when one of these changes.
+    Watching {
+        files: &'a [PathBuf],
+    },
+    /// This one has.
+    Changed {
+        file: &'a Path,
+    },
+}
 
 /// Shows the progress of one run. Clones show the same.
 #[derive(Clone)]
@@ -20,6 +86,7 @@ pub(crate) struct Display {
 enum Kind {
     Bars,
     Lines,
+    Events,
     Nothing,
 }
 
@@ -31,14 +98,20 @@ struct Phase {
     bar: ProgressBar,
 }
 
+impl Audience {
+    /// Whoever looks at the terminal, unless it is to be quiet.
+    pub fn unless(quiet: bool) -> Self {
+        if quiet { Self::Nobody } else { Self::People }
+    }
+}
+
 impl Display {
-    pub fn new(quiet: bool) -> Self {
-        let kind = if quiet {
-            Kind::Nothing
-        } else if stderr().is_terminal() {
-            Kind::Bars
-        } else {
-            Kind::Lines
+    pub fn new(audience: Audience) -> Self {
+        let kind = match audience {
+            Audience::People if stderr().is_terminal() => Kind::Bars,
+            Audience::People => Kind::Lines,
+            Audience::Programs => Kind::Events,
+            Audience::Nobody => Kind::Nothing,
         };
         Self {
             kind,
@@ -64,7 +137,16 @@ impl Display {
                 phase.bar.set_style(counted());
             }
             phase.bar.set_position(phase.done);
-            if self.kind == Kind::Lines && total > 0 && phase.told.elapsed() >= LINE_EVERY {
+            let every = match self.kind {
+                Kind::Events => EVENT_EVERY,
+                Kind::Bars | Kind::Lines | Kind::Nothing => LINE_EVERY,
+            };
+            let due = total > 0 && phase.told.elapsed() >= every;
+            if due && self.kind == Kind::Events {
+                phase.told = Instant::now();
+                let done = phase.done;
+                event(&Event::Progress { name, done, total });
+            } else if due && self.kind == Kind::Lines {
                 phase.told = Instant::now();
                 let elapsed = phase.begin.elapsed().as_secs_f64();
                 let rate = phase.done as f64 / elapsed;
@@ -85,18 +167,44 @@ impl Display {
 
     /// Says something beside the progress.
     pub fn note(&self, text: &str) {
+        self.tell_of(text, &Event::Note { text });
+    }
+
+    /// Warns of something that does not end the run.
+    pub fn warn(&self, text: &str) {
+        self.tell_of(&format!("warning: {text}"), &Event::Warning { text });
+    }
+
+    /// Tells programs of something that people are told in another way.
+    pub fn event(&self, what: &Event) {
+        if self.kind == Kind::Events {
+            event(what);
+        }
+    }
+
+    /// Tells programs why there is no result; people read it when the process ends.
+    pub fn failed(&self, error: &Error) {
+        let text = &error.to_string();
+        let exit_code = error.exit_code();
+        self.event(&Event::Failed { exit_code, text });
+    }
+
+    /// Says something beside the progress to people, and tells programs of it in their way.
+    pub fn tell_of(&self, text: &str, what: &Event) {
         let current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
         match (self.kind, current.as_ref()) {
             (Kind::Nothing, _) => {}
+            (Kind::Events, _) => event(what),
             (Kind::Bars, Some(phase)) => phase.bar.suspend(|| line(text)),
             (Kind::Bars | Kind::Lines, _) => line(text),
         }
     }
 
     fn begin(&self, name: &'static str, total: u64) -> Phase {
+        self.event(&Event::Phase { name });
         let target = match self.kind {
             Kind::Bars => ProgressDrawTarget::stderr(),
-            Kind::Lines | Kind::Nothing => ProgressDrawTarget::hidden(),
+            Kind::Lines | Kind::Events | Kind::Nothing => ProgressDrawTarget::hidden(),
         };
         let bar = ProgressBar::with_draw_target((total > 0).then_some(total), target);
         bar.set_style(if total > 0 { counted() } else { uncounted() });
@@ -124,7 +232,9 @@ impl Display {
         };
         bar.finish_and_clear();
         let seconds = begin.elapsed().as_secs_f64();
-        if done > 0 {
+        if self.kind == Kind::Events {
+            event(&Event::PhaseDone { name, seconds });
+        } else if done > 0 {
             let rate = done as f64 / seconds;
             line(&format!(
                 "{name:<10} {seconds:>8.3} s   {done} positions, {rate:.0}/s"
@@ -132,6 +242,13 @@ impl Display {
         } else {
             line(&format!("{name:<10} {seconds:>8.3} s"));
         }
+    }
+}
+
+fn event(what: &Event) {
+    if let Ok(text) = serde_json::to_string(what) {
+        // Nobody may be listening.
+        let _ = writeln!(stdout(), "{text}");
     }
 }
 

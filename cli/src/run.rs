@@ -30,9 +30,11 @@ use crate::error::{Error, Result};
 use crate::examine::{Subject, examine};
 use crate::machined::FOR_REPORT;
 use crate::passes::Passes;
-use crate::progress::Display;
+use crate::progress::{Audience, Display, Event};
 use crate::serve::{NOTICE, runtime};
-use crate::{cluster, here, lasts, passes, program, say, submit, system, verify};
+use crate::{
+    cluster, forecast, here, lasts, passes, program, say, sizes, submit, system, verify, watch,
+};
 
 /// A job and where its results go.
 pub(crate) struct Asked<'a> {
@@ -41,12 +43,31 @@ pub(crate) struct Asked<'a> {
     pub output: &'a Path,
 }
 
-/// Computes a job in this process or on local workers.
+/// Computes a job in this process or on local workers, once or with every change of it; or tells only what
+/// would be done.
 pub(crate) fn run(args: &args::Run) -> Result<()> {
+    let Some(output) = args.output.as_deref().filter(|_| !args.dry_run) else {
+        return forecast::tell(args);
+    };
+    let once = |stop: &CancellationToken| match args.sizes.asked() {
+        true => sizes::run(args, output, stop),
+        false => one(args, output, stop),
+    };
+    if !args.watch {
+        return once(&CancellationToken::new());
+    }
+    let how = &args.job.how;
+    let (overrides, display) = (how.overrides(args.workers), Display::new(how.audience()));
+    watch::watch(&args.job.file, &overrides, &display, once)
+}
+
+/// Computes a job until `stop`.
+fn one(args: &args::Run, output: &Path, stop: &CancellationToken) -> Result<()> {
     perform(
-        &asked(&args.job, &args.output),
+        &asked(&args.job, output),
         args.workers,
         args.threads.map(usize::from),
+        stop,
         async |part, file, targets, display, stop| {
             let threads = args.threads.map(usize::from);
             let simd = args.simd.unwrap_or_else(Simd::best);
@@ -87,6 +108,7 @@ pub(crate) fn submit(args: &args::Submit) -> Result<()> {
         &asked(&args.job, output),
         None,
         None,
+        &CancellationToken::new(),
         async |part, file, targets, display, stop| {
             display.tell("send", 0, 0);
             let name = name_of(&args.job.file);
@@ -128,8 +150,11 @@ fn detach(args: &args::Job, remote: &Remote) -> Result<()> {
     check_single(&file, "submit --detach")?;
     let (name, sharing) = (name_of(&args.file), file.cluster.sharing);
     let sending = submit::send(remote, &part, file.job, sharing, &name);
-    let id = runtime()?.block_on(sending)?;
-    say(&id.to_string());
+    let job = runtime()?.block_on(sending)?;
+    match args.how.audience() {
+        Audience::Programs => Display::new(Audience::Programs).event(&Event::Submitted { job }),
+        Audience::People | Audience::Nobody => say(&job.to_string()),
+    }
     Ok(())
 }
 
@@ -145,13 +170,14 @@ pub(crate) fn fetch(args: args::Fetch) -> Result<()> {
                 how: &args.how,
                 output: &output,
             };
-            perform(&asked, None, None, async |_, _, _, display, stop| {
+            let stop = CancellationToken::new();
+            perform(&asked, None, None, &stop, async |_, _, _, display, stop| {
                 let progress = progress(display);
                 let fetched = unless(stop, submit::fetch(&remote, id, wait, &progress)).await;
                 Ok(vec![fetched?])
             })?;
         }
-        None => fetch_alone(&remote, id, wait, &output, args.how.quiet)?,
+        None => fetch_alone(&remote, id, wait, &output, args.how.audience())?,
     }
     if args.keep {
         return Ok(());
@@ -163,10 +189,16 @@ pub(crate) fn fetch(args: args::Fetch) -> Result<()> {
 const UNKNOWN: &str = "this path was fetched without its job file: it keeps out of nothing that the job's [[keep_out]] may name";
 
 /// Fetches a path about whose part and machine nothing is known here.
-fn fetch_alone(remote: &Remote, id: u64, wait: bool, output: &Path, quiet: bool) -> Result<()> {
+fn fetch_alone(
+    remote: &Remote,
+    id: u64,
+    wait: bool,
+    output: &Path,
+    audience: Audience,
+) -> Result<()> {
     let runtime = runtime()?;
     output::prepare_dir(output)?;
-    let display = Display::new(quiet);
+    let display = Display::new(audience);
     let progress = progress(display.clone());
     let fetched = runtime.block_on(async {
         tokio::select! {
@@ -175,7 +207,7 @@ fn fetch_alone(remote: &Remote, id: u64, wait: bool, output: &Path, quiet: bool)
         }
     });
     display.finish();
-    let (path, record) = fetched?;
+    let (path, record) = fetched.inspect_err(|error| display.failed(error))?;
     let report = Report {
         version: VERSION.to_owned(),
         job: serde_json::Value::Null,
@@ -194,7 +226,8 @@ fn fetch_alone(remote: &Remote, id: u64, wait: bool, output: &Path, quiet: bool)
     csv::save(&staging.file(output::PATH), &path)?;
     report::save(&staging.file(output::REPORT), &report)?;
     staging.publish()?;
-    if !quiet {
+    display.event(&Event::Done { directory: output });
+    if audience == Audience::People {
         say(&output.join(output::PATH).display().to_string());
     }
     Ok(())
@@ -211,7 +244,7 @@ fn leave(remote: &Remote, jobs: &[u64]) -> Result<()> {
 }
 
 /// A job whose positions depend on those before them is not for several workers.
-fn check_divisible(file: &JobFile) -> Result<()> {
+pub(crate) fn check_divisible(file: &JobFile) -> Result<()> {
     match file.job.method {
         Method::Local(local) if local.needs_whole_path() => Err(Error::OneProcess),
         _ => Ok(()),
@@ -280,11 +313,12 @@ pub(crate) fn read(file: &Path, overrides: &Overrides) -> Result<Prepared> {
 }
 
 /// Reads a job, has it computed, and writes its results; stops when it is interrupted, as does what
-/// computes.
+/// computes, and by `stop`.
 fn perform(
     asked: &Asked,
     workers: Option<u32>,
     threads: Option<usize>,
+    stop: &CancellationToken,
     compute: impl AsyncFnOnce(
         Part,
         &JobFile,
@@ -294,19 +328,21 @@ fn perform(
     ) -> Result<Vec<Outcome>>,
 ) -> Result<()> {
     let runtime = runtime()?;
-    let stop = CancellationToken::new();
-    stop_when_interrupted(&runtime, &stop);
-    let display = Display::new(asked.how.quiet);
+    stop_when_interrupted(&runtime, stop);
+    let audience = asked.how.audience();
+    let display = Display::new(audience);
     let performed = runtime.block_on(async {
         let overrides = asked.how.overrides(workers);
-        carry_out(asked, &overrides, threads, &display, &stop, compute).await
+        carry_out(asked, &overrides, threads, &display, stop, compute).await
     });
     // Before anything else is said, and also if nothing good came of it.
     display.finish();
     runtime.shutdown_timeout(NOTICE);
-    let report = performed?;
-    if !asked.how.quiet {
-        summarize(asked.output, &report);
+    let report = performed.inspect_err(|error| display.failed(error))?;
+    let directory = asked.output;
+    display.event(&Event::Done { directory });
+    if audience == Audience::People {
+        summarize(directory, &report);
     }
     Ok(())
 }
@@ -352,7 +388,7 @@ pub(crate) async fn carry_out(
     let read = phase("read", begin);
     output::prepare_dir(asked.output)?;
     for warning in &warnings {
-        display.note(&format!("warning: {warning}"));
+        display.warn(warning);
     }
     let computing = compute(part.clone(), &file, targets, display.clone(), stop.clone());
     let (digitized, mut record) = of_finish(computing.await?);
@@ -370,7 +406,7 @@ pub(crate) async fn carry_out(
     }
     let mut passes = made;
     for warning in passes.warnings(&file) {
-        display.note(&format!("warning: {warning}"));
+        display.warn(&warning);
         warnings.push(warning);
     }
     let mut left = None;
@@ -571,7 +607,7 @@ fn write(
     // Nobody turns a picture: a path without one is as good.
     if let Err(error) = drawn {
         let warning = format!("there is no picture: {error}");
-        display.note(&format!("warning: {warning}"));
+        display.warn(&warning);
         report.warnings.push(warning);
     }
     report.record.phases.push(phase("write", begin));

@@ -3,6 +3,7 @@
 //! Every size and side is a run like any other, into a directory of its own; they differ only in what the
 //! last is made of before it is digitized. All are written, or none.
 
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::thread;
@@ -17,7 +18,7 @@ use tokio_util::sync::CancellationToken;
 use crate::args;
 use crate::cluster::{self, Local, Workers};
 use crate::error::{Error, Result};
-use crate::progress::Display;
+use crate::progress::{Audience, Display, Event};
 use crate::run::{Asked, carry_out, progress, stop_when_interrupted, unless};
 use crate::serve::{NOTICE, runtime};
 use crate::{here, say, system};
@@ -31,15 +32,33 @@ struct Wanted {
 }
 
 /// Runs a job for all sizes and sides.
-pub(crate) fn run(args: &args::Run) -> Result<()> {
-    let how = &args.job.how;
+pub(crate) fn run(args: &args::Run, output: &Path, stop: &CancellationToken) -> Result<()> {
+    let audience = args.job.how.audience();
+    let display = Display::new(audience);
+    let made = make(args, output, &display, stop);
+    display.finish();
+    made.inspect_err(|error| display.failed(error))?;
+    display.event(&Event::Done { directory: output });
+    if audience == Audience::People {
+        for name in [output::REPORT, output::VIEW] {
+            say(&output.join(name).display().to_string());
+        }
+    }
+    Ok(())
+}
+
+/// Makes all of them, and the report of all, or nothing.
+fn make(
+    args: &args::Run,
+    output: &Path,
+    display: &Display,
+    stop: &CancellationToken,
+) -> Result<()> {
     let (file, wanted) = wanted(args)?;
-    output::prepare_sizes(&args.output)?;
+    output::prepare_sizes(output)?;
     let runtime = runtime()?;
-    let stop = CancellationToken::new();
-    stop_when_interrupted(&runtime, &stop);
-    let display = Display::new(how.quiet);
-    let staging = Staging::begin_of(&args.output, output::of_sizes)?;
+    stop_when_interrupted(&runtime, stop);
+    let staging = Staging::begin_of(output, output::of_sizes)?;
     let cluster = match file.cluster.workers {
         0 => None,
         number => Some(runtime.block_on(unless(
@@ -63,7 +82,7 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
             let Some((place, wanted)) = next else {
                 return Ok(made);
             };
-            let one = one(args, wanted, &staging, cluster.as_ref(), threads, &stop);
+            let one = one(args, wanted, &staging, cluster.as_ref(), threads, stop);
             let size = runtime.block_on(one).inspect_err(|_| stop.cancel());
             let size = size.map_err(|source| match source {
                 Error::Interrupted => source,
@@ -84,7 +103,6 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
             .collect()
     });
     runtime.block_on(async { drop(cluster) });
-    display.finish();
     runtime.shutdown_timeout(NOTICE);
     let made = all(ended)?;
     let report = Sizes {
@@ -100,11 +118,6 @@ pub(crate) fn run(args: &args::Run) -> Result<()> {
     };
     sizes::save(staging.dir(), &report)?;
     staging.publish()?;
-    if !how.quiet {
-        for name in [output::REPORT, output::VIEW] {
-            say(&args.output.join(name).display().to_string());
-        }
-    }
     Ok(())
 }
 
@@ -160,7 +173,7 @@ async fn one(
         output: &output,
     };
     // Several at once have no place for the progress of each.
-    let display = Display::new(true);
+    let display = Display::new(Audience::Nobody);
     let simd = args.simd.unwrap_or_else(Simd::best);
     let computing =
         async |part, file: &JobFile, targets: Vec<Job>, display, stop: CancellationToken| {

@@ -35,6 +35,49 @@ pub struct Model {
 }
 
 impl Model {
+    /// Rows of grids whose points are there already: each an array of rows, none shorter than another, that
+    /// run around the spindle one after the other.
+    ///
+    /// # Errors
+    /// [`Error::EmptyPart`] without a grid; [`Error::OutOfBounds`] for one of fewer than 2 × 2 points;
+    /// [`Error::UnequalRows`]; those of points that are not finite or too far out.
+    pub fn of_grids(grids: &[Vec<Vec<Point>>]) -> Result<Self> {
+        if grids.is_empty() {
+            return Err(Error::EmptyPart);
+        }
+        let mut model = Self::default();
+        for (number, grid) in (1..).zip(grids) {
+            let columns = grid.first().map_or(0, Vec::len) as u32;
+            let size = Discretization::Grid {
+                rows: grid.len() as u32,
+                columns,
+            };
+            size.validate()?;
+            let first = model.rows.len();
+            let last = first + grid.len() - 1;
+            model
+                .rows
+                .extend((first..).zip(grid).map(|(id, points)| Row {
+                    id: id as u32,
+                    points: points.clone(),
+                    kind: RowKind::Isoline {
+                        joins_next: id < last,
+                    },
+                }));
+            let rows = &model.rows[first..];
+            rows.iter().try_for_each(Row::validate)?;
+            let mut pairs = rows.windows(2);
+            pairs.try_for_each(|pair| pair[0].validate_next(&pair[1]))?;
+            let mut outlines: Vec<Outline> = rows.iter().map(Row::outline).collect();
+            let name = format!("grid {number}");
+            model
+                .bodies
+                .push(joined(name, &mut outlines, Some(columns), None));
+            model.outlines.extend(outlines);
+        }
+        Ok(model)
+    }
+
     /// Every facet by its corners, mm.
     pub fn triangles(&self) -> Vec<[Point; 3]> {
         let points: Vec<Point> = self.rows.iter().flat_map(|r| r.points.clone()).collect();
@@ -132,20 +175,33 @@ pub(crate) fn survey(bodies: &[Layout], mut take: impl FnMut(Row)) -> Survey {
                 (name, Some(lines.vs.len() as u32), lines.deviation)
             }
         };
-        join(&mut outlines);
-        let x = Outline::span(&outlines);
-        survey.bodies.push(BodyRecord {
-            name: (*name).to_owned(),
-            rows: outlines.len() as u32,
-            columns,
-            points: outlines.iter().map(|r| r.points).sum(),
-            facets: outlines.iter().map(|r| r.facets).sum(),
-            x: [x.low, x.high],
-            deviation,
-        });
+        let name = (*name).to_owned();
+        survey
+            .bodies
+            .push(joined(name, &mut outlines, columns, deviation));
         survey.outlines.extend(outlines);
     }
     survey
+}
+
+/// Joins the outlines of a body, and tells what became of it.
+fn joined(
+    name: String,
+    outlines: &mut [Outline],
+    columns: Option<u32>,
+    deviation: Option<f64>,
+) -> BodyRecord {
+    join(outlines);
+    let x = Outline::span(outlines);
+    BodyRecord {
+        name,
+        rows: outlines.len() as u32,
+        columns,
+        points: outlines.iter().map(|r| r.points).sum(),
+        facets: outlines.iter().map(|r| r.facets).sum(),
+        x: [x.low, x.high],
+        deviation,
+    }
 }
 
 /// The parameters of a grid's lines.
@@ -242,6 +298,42 @@ mod tests {
         let outlines = &model.outlines;
         assert_eq!(outlines[0].x.high, 5.0, "facets reach up to the next row");
         assert_eq!(outlines[2].facets, 0);
+    }
+
+    #[test]
+    fn points_that_are_there_are_taken_as_they_are() {
+        let surface = quarter_cylinder(5.0, 10.0);
+        let size = |rows, columns| Discretization::Grid { rows, columns };
+        let made = |rows, columns| {
+            let part = part(Shape::Surface(surface.clone()));
+            discretize(&part, size(rows, columns)).expect("valid")
+        };
+        let points = |model: &Model| -> Vec<Vec<Point>> {
+            model.rows.iter().map(|r| r.points.clone()).collect()
+        };
+        let (a, b) = (made(3, 5), made(4, 7));
+        let both = Model::of_grids(&[points(&a), points(&b)]).expect("valid");
+        assert_eq!(
+            both.outlines,
+            [a.outlines.clone(), b.outlines.clone()].concat()
+        );
+        assert_eq!(both.rows[..3], a.rows);
+        assert_eq!(both.rows[3].id, 3);
+        assert_eq!(both.bodies[1].facets, b.bodies[0].facets);
+
+        let mut short = points(&a);
+        short[1].pop();
+        let mut far = points(&a);
+        far[1][2][0] = f64::INFINITY;
+        for bad in [
+            vec![],
+            vec![vec![]],
+            vec![points(&a)[..1].to_vec()],
+            vec![short],
+            vec![far],
+        ] {
+            assert!(Model::of_grids(&bad).is_err(), "{bad:?}");
+        }
     }
 
     #[test]

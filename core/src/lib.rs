@@ -4,6 +4,75 @@
 //! first touches: that is the tool centre for this position. The modules follow the pipeline.
 //! This crate refuses I/O, clocks, async and wire types: it is values in and values out, and the
 //! same values in give the same bits out on any machine and with any number of threads.
+//!
+//! # From a part to a path
+//!
+//! An octahedron, turned by a torus wheel of R 40 and r 8. Lengths are in mm, and X is the spindle.
+//!
+//! ```
+//! use horma_core::*;
+//!
+//! # fn main() -> Result<()> {
+//! let corners = vec![
+//!     [-30.0, 0.0, 0.0],
+//!     [30.0, 0.0, 0.0],
+//!     [0.0, 20.0, 0.0],
+//!     [0.0, -20.0, 0.0],
+//!     [0.0, 0.0, 20.0],
+//!     [0.0, 0.0, -20.0],
+//! ];
+//! let facets = vec![
+//!     [0, 2, 4],
+//!     [0, 4, 3],
+//!     [0, 3, 5],
+//!     [0, 5, 2],
+//!     [1, 4, 2],
+//!     [1, 3, 4],
+//!     [1, 5, 3],
+//!     [1, 2, 5],
+//! ];
+//! let name = "octahedron".to_owned();
+//! let shape = Shape::Mesh(Mesh::new(&name, corners, facets)?);
+//! let part = Part {
+//!     bodies: vec![Body { name, shape }],
+//! };
+//! let job = Job {
+//!     discretization: Discretization::Tolerance(0.01),
+//!     cutter: Cutter::torus(40.0, 8.0)?,
+//!     motion: Motion {
+//!         kind: MotionKind::Helix,
+//!         step: 1.0,
+//!         points_per_revolution: 90,
+//!         from: Some(-30.0),
+//!         to: Some(30.0),
+//!         path_tolerance: None,
+//!     },
+//!     contact: Contact::Facet,
+//!     method: Method::Exact,
+//! };
+//!
+//! // Rows and positions; a job that takes more than a gigabyte is refused.
+//! let plan = Plan::new(&part, job, 1 << 30)?;
+//! // Their hierarchy, and the search, on the threads of the current rayon pool.
+//! let digitizer = Digitizer::new(&job, &plan.model.rows, Simd::best());
+//! let mut runs = Vec::new();
+//! let positions = 0..plan.trajectory.positions;
+//! digitizer.run_chunks(&plan.trajectory, positions, |run, _cost| {
+//!     runs.push(run);
+//!     true // go on
+//! });
+//! let path = stitch(plan.trajectory, runs)?;
+//!
+//! // After 30 revolutions the wheel stands above the corner at y = 20.
+//! let touch = path.touches[30 * 90].expect("the corner is in reach");
+//! assert_eq!(touch.height, 20.0 + 40.0 + 8.0);
+//! assert_eq!(touch.contact, [0.0, 20.0, 0.0]);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Points that lie in rows already go in by [`Model::of_grids`] and [`Plan::over`]. [`verify()`] holds the
+//! path against the part, by a search of its own.
 
 mod error;
 mod tolerance;

@@ -55,6 +55,29 @@ impl Plan {
         })
     }
 
+    /// Lays out the positions over rows that are there already, if all of it fits into `memory` bytes.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]; those of [`Job::validate`] and of [`crate::Motion::over`];
+    /// [`Error::LocalNeedsGrids`] if a body is a mesh and the method goes by windows.
+    pub fn over(model: Model, job: Job, memory: u64) -> Result<Self> {
+        job.validate()?;
+        let mesh = model.bodies.iter().find(|body| body.columns.is_none());
+        if let (Method::Local(_), Some(mesh)) = (job.method, mesh) {
+            let name = mesh.name.clone();
+            return Err(Error::LocalNeedsGrids { name });
+        }
+        let trajectory = positions(&job, &model.outlines)?;
+        let points = model.outlines.iter().map(|o| o.points as f64).sum();
+        let needed = check_memory(points, POINT_BYTES, trajectory.positions, memory)?;
+        Ok(Self {
+            job,
+            model,
+            trajectory,
+            most_inserted: most_inserted(&job, memory as f64 - needed),
+        })
+    }
+
     /// Whether so many inserted positions can be kept.
     ///
     /// # Errors

@@ -19,7 +19,7 @@ use horma_formats::plot;
 
 use crate::args::{BenchScaling, Search};
 use crate::error::{Error, Result};
-use crate::progress::Display;
+use crate::progress::{Audience, Display};
 use crate::serve::{NOTICE, runtime};
 use crate::{say, system};
 use runs::{Case, Run};
@@ -44,7 +44,7 @@ struct Experiment {
 
 /// Measures, prints the tables and writes the results.
 pub(crate) fn scaling(args: &BenchScaling) -> Result<()> {
-    let display = Display::new(args.quiet);
+    let display = Display::new(Audience::unless(args.quiet));
     let measured = measure_and_write(args, &display);
     display.finish();
     say(measured?.trim_end());

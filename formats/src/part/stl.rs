@@ -215,8 +215,11 @@ pub(super) fn shortened(line: &str) -> String {
     short
 }
 
-/// Vertices of the same bits become one, times `scale`.
-fn weld(name: &str, facets: &[[Point; 3]], scale: f64) -> Result<Mesh> {
+/// A mesh of facets that are given by their corners, times `scale`: vertices of the same bits become one.
+///
+/// # Errors
+/// Those of [`Mesh::new`].
+pub fn weld(name: &str, facets: &[[Point; 3]], scale: f64) -> Result<Mesh> {
     let mut places = HashMap::with_capacity(facets.len() / 2);
     let mut vertices = Vec::with_capacity(facets.len() / 2);
     let triangles = facets.iter().map(|corners| {

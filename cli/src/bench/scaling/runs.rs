@@ -10,7 +10,7 @@ use super::super::check;
 use crate::args::Search;
 use crate::cluster::{self, Workers};
 use crate::error::{Error, Result};
-use crate::progress::Display;
+use crate::progress::{Audience, Display};
 use crate::{here, system};
 
 /// What is run in every round.
@@ -115,7 +115,7 @@ async fn alone(part: Part, case: &Case, round: u32) -> Result<(Run, ToolPath)> {
     let (begin, job) = (Instant::now(), case.job);
     let before = own_cpu();
     let run = move || {
-        let (quiet, stop) = (Display::new(true), CancellationToken::new());
+        let (quiet, stop) = (Display::new(Audience::Nobody), CancellationToken::new());
         here::run(&part, job, 1, Simd::best(), &quiet, &stop)
     };
     let ran = tokio::task::spawn_blocking(run).await;
