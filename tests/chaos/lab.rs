@@ -24,6 +24,10 @@ impl Lab {
         if !script.exists() {
             return Err(format!("no {} here", script.display()));
         }
+        // The hosts can be made without it, but not cut off.
+        if Command::new("nft").arg("--version").output().is_err() {
+            return Err("nft is missing (on Debian: apt-get install nftables)".to_owned());
+        }
         let lab = Self {
             script,
             prefix: format!("chaos{}", std::process::id()),
