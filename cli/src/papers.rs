@@ -4,14 +4,14 @@ use horma_papers::{Experiment, PAGE, VIEW};
 
 use crate::args;
 use crate::error::Result;
-use crate::progress::Display;
+use crate::progress::{Audience, Display};
 use crate::say;
 
 /// Makes the experiments and writes their report.
 pub(crate) fn papers(args: &args::Papers) -> Result<()> {
     // What cannot be written should not be computed first.
     horma_papers::prepare(&args.output)?;
-    let display = Display::new(args.quiet);
+    let display = Display::new(Audience::unless(args.quiet));
     let asked = |e: &Experiment| args.names.is_empty() || args.names.contains(e);
     let chapters = Experiment::ALL.into_iter().filter(asked).map(|experiment| {
         display.tell(experiment.name(), 0, 0);
