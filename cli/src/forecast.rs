@@ -93,7 +93,7 @@ pub(crate) fn tell(args: &args::Run) -> Result<()> {
     let forecast = forecast.inspect_err(|error| display.failed(error))?;
     match audience {
         Audience::Programs => {
-            say(&serde_json::json!({ "event": "plan", "plan": forecast }).to_string())
+            say(&serde_json::json!({ "event": "plan", "plan": forecast }).to_string());
         }
         Audience::People | Audience::Nobody => say(forecast.to_string().trim_end()),
     }

@@ -1,5 +1,7 @@
 //! Chromium without a screen, driven by what its driver understands: WebDriver, JSON over HTTP.
 
+#![allow(dead_code)] // Each test binary uses its part of this.
+
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
