@@ -19,49 +19,58 @@ struct Stand {
     sin: f64,
 }
 
-/// Cutters by the direction from which they come, each lot in order of travel.
-struct Lot {
-    stands: Vec<Stand>,
-    /// The lowest of them, mm.
-    low: f64,
-}
-
 /// Lots of a revolution.
 const LOTS: usize = 360;
+
+/// A cutter as a row of rays sees it: a disc, its centre this far from the spindle.
+#[derive(Debug, Clone, Copy)]
+struct Disc {
+    radius: f64,
+    height: f64,
+    cos: f64,
+    sin: f64,
+}
+
+/// The discs of a lot that a row of rays may meet.
+struct Discs {
+    discs: Vec<Disc>,
+    /// How near to the spindle the nearest of them comes, mm.
+    gap: f64,
+}
+
+/// Slack for rounding of a bound, mm.
+const SLACK: f64 = 1.0e-9;
 
 /// Where each ray first meets a cutter.
 pub(super) fn cut(cutter: &Cutter, positions: &[Position], rays: &Rays) -> Vec<Option<f64>> {
     let lots = lots(positions);
     let directions = rays.rings().directions();
-    let (width, most) = (cutter.half_width(), cutter.max_radius());
-    let low = lots.iter().map(|lot| lot.low).fold(f64::INFINITY, f64::min);
-    // Seen from the spindle, a cutter is as wide as this at most; one on the spindle is everywhere.
-    let wide = if low > most {
-        (most / low).asin()
-    } else {
-        std::f64::consts::PI
-    };
+    let most = cutter.max_radius();
     let turn = std::f64::consts::TAU / LOTS as f64;
-    let reach = ((wide / turn).ceil() as usize + 1).min(LOTS / 2);
+    // The least angle between a ray and what lies so many lots away, as far as anything can be met.
+    let least: Vec<(f64, f64)> = (0..=LOTS / 4 + 1)
+        .map(|away: usize| (away.saturating_sub(1) as f64 * turn).sin_cos())
+        .collect();
     let row = |row: u32| {
         let x = rays.from + rays.step * f64::from(row);
-        let near: Vec<&[Stand]> = lots
-            .iter()
-            .map(|lot| {
-                let from = lot.stands.partition_point(|s| s.x < x - width);
-                let to = lot.stands.partition_point(|s| s.x <= x + width);
-                &lot.stands[from..to]
-            })
-            .collect();
+        let near: Vec<Discs> = lots.iter().map(|lot| discs(cutter, lot, x)).collect();
+        let gap = near.iter().map(|n| n.gap).fold(f64::INFINITY, f64::min);
+        if gap <= 0.0 {
+            // It is in the spindle's way: nothing is left.
+            return vec![Some(0.0); directions.len()];
+        }
         let ray = |(column, &direction): (usize, &(f64, f64))| {
             let home = column * LOTS / directions.len();
             let mut first = f64::INFINITY;
-            for away in 0..=reach {
+            for (away, &angle) in least.iter().enumerate() {
+                if soonest(gap, most, angle) >= first {
+                    break;
+                }
                 let sides = [home + away, home + LOTS - away];
                 for side in &sides[..if away == 0 { 1 } else { 2 }] {
-                    let lot = side % LOTS;
-                    if lots[lot].low - most < first {
-                        first = first_met(cutter, most, near[lot], x, direction, first);
+                    let lot = &near[side % LOTS];
+                    if soonest(lot.gap, most, angle) < first {
+                        first = first_met(&lot.discs, direction, first);
                     }
                 }
             }
@@ -73,22 +82,50 @@ pub(super) fn cut(cutter: &Cutter, positions: &[Position], rays: &Rays) -> Vec<O
     rows.concat()
 }
 
-/// All poses of a path, by direction and travel.
-fn lots(positions: &[Position]) -> Vec<Lot> {
-    let mut lots: Vec<Lot> = (0..LOTS)
-        .map(|_| Lot {
-            stands: Vec::new(),
-            low: f64::INFINITY,
+/// The discs of a lot at travel `x`.
+fn discs(cutter: &Cutter, lot: &[Stand], x: f64) -> Discs {
+    let width = cutter.half_width();
+    let from = lot.partition_point(|s| s.x < x - width);
+    let to = lot.partition_point(|s| s.x <= x + width);
+    let disc = |stand: &Stand| {
+        Some(Disc {
+            radius: cutter.profile(x - stand.x)?,
+            height: stand.height,
+            cos: stand.cos,
+            sin: stand.sin,
         })
-        .collect();
+    };
+    let discs: Vec<Disc> = lot[from..to].iter().filter_map(disc).collect();
+    let gaps = discs.iter().map(|d| d.height - d.radius);
+    Discs {
+        gap: gaps.fold(f64::INFINITY, f64::min),
+        discs,
+    }
+}
+
+/// How far out a ray goes at least before it meets a disc of at most radius `most` that comes no nearer to the
+/// spindle than `gap`, and whose centre is at least this angle off the ray. Of all such discs the one of radius
+/// `most`, at `gap`, and at that angle is met first: it holds any smaller one with the same nearest point, and
+/// turning a disc away or moving it out only delays the ray.
+fn soonest(gap: f64, most: f64, (sin, cos): (f64, f64)) -> f64 {
+    let height = gap + most;
+    let aside = height * sin;
+    if cos <= 0.0 || aside > most + SLACK || gap == f64::INFINITY {
+        return f64::INFINITY;
+    }
+    height * cos - ((most - aside) * (most + aside)).max(0.0).sqrt() - SLACK
+}
+
+/// All poses of a path: lots by the direction from which they come, each in order of travel.
+fn lots(positions: &[Position]) -> Vec<Vec<Stand>> {
+    let mut lots = vec![Vec::new(); LOTS];
     let mut add = |x: f64, angle: f64, height: f64| {
         // From below the spindle is from above on the other side.
         let angle = if height < 0.0 { angle + 180.0 } else { angle };
         let degrees = angle.rem_euclid(360.0);
         let radians = degrees.to_radians();
         let lot = &mut lots[((degrees / 360.0 * LOTS as f64) as usize).min(LOTS - 1)];
-        lot.low = lot.low.min(height.abs());
-        lot.stands.push(Stand {
+        lot.push(Stand {
             x,
             height: height.abs(),
             cos: libm::cos(radians),
@@ -115,36 +152,23 @@ fn lots(positions: &[Position]) -> Vec<Lot> {
         }
     }
     for lot in &mut lots {
-        lot.stands.sort_by(|a, b| a.x.total_cmp(&b.x));
+        lot.sort_by(|a, b| a.x.total_cmp(&b.x));
     }
     lots
 }
 
-/// The lesser of `first` and where a ray first meets one of these cutters, which are `most` mm in radius.
-fn first_met(
-    cutter: &Cutter,
-    most: f64,
-    stands: &[Stand],
-    x: f64,
-    (cos, sin): (f64, f64),
-    mut first: f64,
-) -> f64 {
-    for stand in stands {
-        // The tool centre along the ray and square to it.
-        let along = stand.height * (stand.cos * cos + stand.sin * sin);
-        if along - most >= first {
+/// The lesser of `first` and where a ray first meets one of these discs.
+fn first_met(discs: &[Disc], (cos, sin): (f64, f64), mut first: f64) -> f64 {
+    for disc in discs {
+        // The centre along the ray and square to it.
+        let along = disc.height * (disc.cos * cos + disc.sin * sin);
+        if along - disc.radius >= first {
             continue;
         }
-        let aside = stand.height * (stand.sin * cos - stand.cos * sin);
-        let Some(m) = cutter.profile(x - stand.x) else {
-            continue;
-        };
-        if stand.height <= m {
-            // It is in the spindle's way: nothing is left.
-            return 0.0;
-        }
-        if along > 0.0 && aside.abs() <= m {
-            first = first.min(along - ((m - aside) * (m + aside)).sqrt());
+        let aside = disc.height * (disc.sin * cos - disc.cos * sin);
+        if along > 0.0 && aside.abs() <= disc.radius {
+            let within = (disc.radius - aside) * (disc.radius + aside);
+            first = first.min(along - within.sqrt());
         }
     }
     first
