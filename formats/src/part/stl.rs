@@ -219,7 +219,7 @@ pub(super) fn shortened(line: &str) -> String {
 ///
 /// # Errors
 /// Those of [`Mesh::new`].
-pub(super) fn weld(name: &str, facets: &[[Point; 3]], scale: f64) -> Result<Mesh> {
+fn weld(name: &str, facets: &[[Point; 3]], scale: f64) -> Result<Mesh> {
     let mut places = HashMap::with_capacity(facets.len() / 2);
     let mut vertices = Vec::with_capacity(facets.len() / 2);
     let triangles = facets.iter().map(|corners| {
