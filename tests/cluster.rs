@@ -244,6 +244,8 @@ fn what_is_inserted_is_the_same_on_any_number_of_workers() {
         "12",
         "--path-tolerance",
         "0.02",
+        "--tolerance",
+        "0.1",
     ];
     let alone = path_of(&sample(), dir.path(), "coarse", &coarse);
     let others: [&[&str]; 4] = [
