@@ -130,7 +130,7 @@ function describe() {
   $("#motion-note").textContent = motionNote();
   const shows = {
     surface: "the sample that strays most there, at the angle at which it faces the wheel",
-    rays: "how far the machined surface lies outside of the designed one, along its normal, where a ray from the spindle meets both",
+    rays: "how far out the machined surface lies there, along the designed one's normal",
     path: "the position that stands out most there",
   };
   $("#map-note").textContent = `Each place shows ${shows[choice.on]}. Click to go there.`;
