@@ -303,6 +303,8 @@ fn fingers_turn_and_zoom_and_play_goes_along_the_path() {
     play("Pause");
     browser.wait("Number(here(0)) > 9020");
     play("Play");
+    // The frame that was on its way is still drawn.
+    browser.ask("return picture()");
     let stopped = browser.ask("return here(0)");
     browser.ask("return picture()");
     assert_eq!(browser.ask("return here(0)"), stopped);

@@ -45,6 +45,7 @@
 //!         points_per_revolution: 90,
 //!         from: Some(-30.0),
 //!         to: Some(30.0),
+//!         lead: [0.0; 2],
 //!         path_tolerance: None,
 //!     },
 //!     contact: Contact::Facet,

@@ -2,11 +2,11 @@
 //!
 //! This crate owns every file format and nothing else: it computes no path and opens no socket.
 //!
-//! # From a job file to a path and a program
+//! # From a job file to a path
 //!
 //! ```
-//! use horma_core::{Digitizer, Plan, Simd, course, place, stitch, timing};
-//! use horma_formats::{csv, job, part, post, sample};
+//! use horma_core::{Digitizer, Plan, Simd, place, stitch};
+//! use horma_formats::{csv, job, part, sample};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let dir = tempfile::tempdir()?;
@@ -18,11 +18,11 @@
 //!     ..Default::default()
 //! };
 //! let file = job::read(&dir.path().join("job.toml"), &overrides)?;
-//! let (part, warnings) = part::read_all(&file.files)?;
-//! assert!(warnings.is_empty());
+//! let read = part::read_all(&file.files, &file.reading)?;
+//! assert!(read.warnings.is_empty());
 //!
 //! // horma-core digitizes it.
-//! let part = place(part, file.axis)?;
+//! let part = place(read.part, file.axis)?;
 //! let plan = Plan::new(&part, file.job, 1 << 30)?;
 //! let digitizer = Digitizer::new(&file.job, &plan.model.rows, Simd::best());
 //! let mut runs = Vec::new();
@@ -33,14 +33,6 @@
 //! });
 //! let path = stitch(plan.trajectory, runs)?;
 //! csv::save(&dir.path().join("path.csv"), &path)?;
-//!
-//! // As the machine's axes run it, and how long they take.
-//! let course = course(&path).expect("the cutter touches the part");
-//! let placed = post::Placed::new(&course, &file.job.cutter, &file.program)?;
-//! let timing = timing(&placed.stations, &file.machine.limits(&file.program));
-//! let heading = [("job", "job.toml")];
-//! let files = post::save(dir.path(), &placed, &timing.durations, &file.program, &heading)?;
-//! assert_eq!(files, ["path.ngc"]);
 //! # Ok(())
 //! # }
 //! ```
