@@ -311,8 +311,9 @@ fn fingers_turn_and_zoom_and_play_goes_along_the_path() {
     browser.ask("choose('#at', document.querySelector('#at').max - 20)");
     play("Pause");
     browser.wait("document.querySelector('#play').textContent === 'Play'");
-    let end = browser.ask("return here(0) === document.querySelector('#at').max");
-    assert_eq!(end, true);
+    browser.ask("return picture()");
+    let end = browser.ask("return [here(0), document.querySelector('#at').max]");
+    assert_eq!(end[0], end[1]);
     assert_eq!(browser.complaints(), Vec::<Value>::new());
 }
 
