@@ -236,47 +236,40 @@ function tinted(gl, points) {
   return { array, colour };
 }
 
-function lineBuffers(gl, points, order) {
+/// Such points, drawn in this order as points, lines or triangles.
+function figure(gl, mode, points, order) {
   const { array, colour } = tinted(gl, points);
   indices(gl, order);
   return {
+    array,
     colour,
     draw() {
       gl.bindVertexArray(array);
-      gl.drawElements(gl.LINE_STRIP, order.length, gl.UNSIGNED_INT, 0);
+      gl.drawElements(mode, order.length, gl.UNSIGNED_INT, 0);
     },
+  };
+}
+
+function lineBuffers(gl, points, order) {
+  const line = figure(gl, gl.LINE_STRIP, points, order);
+  return {
+    ...line,
     dot(i) {
-      gl.bindVertexArray(array);
+      gl.bindVertexArray(line.array);
       gl.drawArrays(gl.POINTS, i, 1);
     },
   };
 }
 
 function shellBuffers(gl, { points, triangles }) {
-  const { array, colour } = tinted(gl, points);
-  indices(gl, triangles);
-  return {
-    colour,
-    draw() {
-      gl.bindVertexArray(array);
-      gl.drawElements(gl.TRIANGLES, triangles.length, gl.UNSIGNED_INT, 0);
-    },
-  };
+  return figure(gl, gl.TRIANGLES, points, triangles);
 }
 
 /// Samples of the surface, those that stray most first.
 function cloud(gl, { points, clearances }) {
-  const { array, colour } = tinted(gl, points);
   const order = Uint32Array.from(clearances, (_, i) => i);
   order.sort((a, b) => Math.abs(clearances[b]) - Math.abs(clearances[a]));
-  indices(gl, order);
-  return {
-    colour,
-    draw() {
-      gl.bindVertexArray(array);
-      gl.drawElements(gl.POINTS, order.length, gl.UNSIGNED_INT, 0);
-    },
-  };
+  return figure(gl, gl.POINTS, points, order);
 }
 
 /// Turns, moves and zooms by pointer and keys; calls `changed` after each.
