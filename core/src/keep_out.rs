@@ -12,7 +12,7 @@ use crate::error::{Result, bounded};
 use crate::path::{ToolPath, Touch};
 use crate::solid::{Section, Solid};
 use crate::tolerance::MAX_COORDINATE;
-use crate::vector::Interval;
+use crate::vector::{Interval, facing};
 
 /// A solid cylinder about the spindle, in part coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,11 +69,11 @@ pub fn keep_out(
 ) -> (ToolPath, Vec<Raised>) {
     let mut raised = vec![Raised::default(); keep_outs.len()];
     let solids: Vec<Solid> = keep_outs.iter().map(KeepOut::solid).collect();
-    let touches = path.along().map(|(waypoint, travel, (cos, sin))| {
+    let touches = path.along().map(|(waypoint, travel, direction)| {
         let part = waypoint.touch;
         let mut touch = part;
         for (solid, raised) in solids.iter().zip(&mut raised) {
-            let Some(height) = solid.height(cutter, travel, (cos, sin)) else {
+            let Some(height) = solid.height(cutter, travel, direction) else {
                 continue;
             };
             if part.is_some_and(|t| t.height >= height) {
@@ -83,7 +83,7 @@ pub fn keep_out(
             if touch.is_none_or(|t| t.height < height) {
                 let radius = solid.reach();
                 let x = waypoint.x.clamp(solid.x.low, solid.x.high);
-                let contact = [x, radius * cos, -radius * sin];
+                let contact = facing(x, radius, direction);
                 touch = Some(Touch { height, contact });
             }
         }

@@ -14,6 +14,7 @@ use crate::cutter::Cutter;
 use crate::error::{Error, Result};
 use crate::path::{ToolPath, Touch};
 use crate::solid::Solid;
+use crate::vector::facing;
 
 /// One layer of roughing.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,7 +68,7 @@ pub fn layers(
     };
     let layer = |k: u32| {
         let all = target.along().zip(both());
-        let touches = all.map(|((waypoint, _, (cos, sin)), (&top, &bottom))| {
+        let touches = all.map(|((waypoint, _, direction), (&top, &bottom))| {
             let Some(top) = top else {
                 return waypoint.touch;
             };
@@ -75,7 +76,7 @@ pub fn layers(
             let touched = waypoint.touch.filter(|t| t.height == height);
             Some(touched.unwrap_or_else(|| {
                 let tip = height - cutter.max_radius();
-                let contact = [waypoint.x, tip * cos, -tip * sin];
+                let contact = facing(waypoint.x, tip, direction);
                 Touch { height, contact }
             }))
         });

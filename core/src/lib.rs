@@ -167,7 +167,7 @@ pub use simd::Simd;
 pub use solid::{Section, Solid};
 pub use surface::{Direction, MAX_DEGREE, Surface};
 pub use tolerance::MAX_COORDINATE;
-pub use vector::{Interval, Point, cross, dot, length, sub, unit};
+pub use vector::{Interval, Point, cross, dot, facing_at, length, sub, unit};
 pub use verify::{
     Clearances, Deviation, Excess, Gouge, INTERMEDIATE, Position, Scallop, Verification,
 };

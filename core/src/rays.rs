@@ -17,7 +17,7 @@ use crate::job::{Contact, Discretization, Job, Method};
 use crate::motion::{Motion, MotionKind, Trajectory};
 use crate::row::Row;
 use crate::simd::Simd;
-use crate::vector::{Interval, Point};
+use crate::vector::{Interval, Point, facing};
 use crate::verify::Position;
 
 /// Rays in rows along the spindle, each row once around: column `j` is where the cutter is when the part
@@ -197,8 +197,8 @@ impl Rays {
     /// The point on a ray at a distance from the spindle, in part coordinates, mm.
     pub fn point(&self, ray: usize, radius: f64) -> Point {
         let rings = self.rings();
-        let (cos, sin) = rings.direction_at(ray as u64, 0.0);
-        [rings.travel(ray as u64), radius * cos, -radius * sin]
+        let ray = ray as u64;
+        facing(rings.travel(ray), radius, rings.direction_at(ray, 0.0))
     }
 
     /// Travel, mm, and angle, degrees, at which a ray faces the cutter.

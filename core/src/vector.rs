@@ -46,6 +46,18 @@ pub fn unit(a: Point) -> Option<Point> {
     (l > 0.0 && l.is_finite()).then(|| [a[0] / l, a[1] / l, a[2] / l])
 }
 
+/// The point at travel `x` and so far from the spindle that faces the cutter when the part is turned by the angle
+/// of this cosine and sine, in part coordinates, mm.
+pub fn facing(x: f64, radius: f64, (cos, sin): (f64, f64)) -> Point {
+    [x, radius * cos, -radius * sin]
+}
+
+/// The same when the part is turned by so many degrees.
+pub fn facing_at(x: f64, radius: f64, degrees: f64) -> Point {
+    let radians = degrees.rem_euclid(360.0).to_radians();
+    facing(x, radius, (libm::cos(radians), libm::sin(radians)))
+}
+
 /// A closed interval `[low, high]` of the x axis, mm; empty if `low > high`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {

@@ -7,7 +7,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use horma_core::{Cutter, Station};
+use horma_core::{Cutter, Station, facing_at};
 
 use crate::error::Result;
 use crate::output;
@@ -82,9 +82,8 @@ pub fn save(
 
 /// Where the wheel's axis ends on the side of smaller x, in the part's frame, with its centre at `height`.
 fn location(station: &Station, height: f64, cutter: &Cutter) -> [f64; 3] {
-    let angle = station.axes[2].rem_euclid(360.0).to_radians();
-    let x = station.axes[0] - cutter.half_width();
-    [x, height * libm::cos(angle), -height * libm::sin(angle)]
+    let [x, _, angle] = station.axes;
+    facing_at(x - cutter.half_width(), height, angle)
 }
 
 /// The way around the part from where one pass ends to where the next begins, nowhere below `safe`.

@@ -9,7 +9,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use horma_core::{Index, Point, Position, ToolPath, Touch, Waypoint};
+use horma_core::{Index, Point, Position, ToolPath, Touch, Waypoint, facing_at};
 
 use crate::decimal::integer;
 use crate::error::{Error, Result};
@@ -50,18 +50,10 @@ impl Row {
     /// else where the rim comes nearest to the spindle.
     pub fn waypoint(&self, rim: f64) -> Waypoint {
         let touch = |height: f64| {
-            let facing = || {
-                let radians = self.angle.rem_euclid(360.0).to_radians();
-                let reach = height - rim;
-                [
-                    self.x,
-                    reach * libm::cos(radians),
-                    -reach * libm::sin(radians),
-                ]
-            };
+            let nearest = || facing_at(self.x, height - rim, self.angle);
             Touch {
                 height,
-                contact: self.contact.unwrap_or_else(facing),
+                contact: self.contact.unwrap_or_else(nearest),
             }
         };
         Waypoint {

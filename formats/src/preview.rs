@@ -8,7 +8,7 @@ mod sheet;
 use std::io::Write;
 use std::path::Path;
 
-use horma_core::{Point, ToolPath, Waypoint};
+use horma_core::{Point, ToolPath, Waypoint, facing_at};
 
 use crate::error::Result;
 use crate::output;
@@ -48,9 +48,7 @@ pub fn save(file: &Path, part: &[Sheet], path: &ToolPath) -> Result<()> {
 /// The tool centre at a position as the part sees it: the cutter turns about the part.
 pub(crate) fn centre(waypoint: &Waypoint) -> Option<Point> {
     let height = waypoint.touch?.height;
-    let radians = waypoint.angle.rem_euclid(360.0).to_radians();
-    let (cos, sin) = (libm::cos(radians), libm::sin(radians));
-    Some([waypoint.x, height * cos, -height * sin])
+    Some(facing_at(waypoint.x, height, waypoint.angle))
 }
 
 #[cfg(test)]
