@@ -323,3 +323,26 @@ fn check_memory(points: f64, point_bytes: f64, positions: u64, available: u64) -
     }
     Ok(needed)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extent::tests::job;
+    use crate::part::Body;
+    use crate::surface::tests::quarter_cylinder;
+
+    #[test]
+    fn over_rows_that_are_there_it_is_what_made_them() {
+        let part = Part {
+            bodies: vec![Body {
+                name: "body".to_owned(),
+                shape: Shape::Surface(quarter_cylinder(5.0, 10.0)),
+            }],
+        };
+        let job = job(1.0, Some(0.01));
+        let made = Plan::new(&part, job, 1 << 30).expect("a plan");
+        let over = |memory| Plan::over(made.model.clone(), job, memory);
+        assert_eq!(over(1 << 30), Ok(made.clone()));
+        assert!(matches!(over(1000), Err(Error::OutOfMemory { .. })));
+    }
+}
