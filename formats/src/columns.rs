@@ -2,16 +2,12 @@
 
 use horma_core::Waypoint;
 
-/// Their names.
-pub(crate) const NAMES: [&str; 7] = [
-    "index",
-    "x",
-    "angle",
-    "y",
-    "contact_x",
-    "contact_y",
-    "contact_z",
-];
+use crate::csv;
+
+/// Their names, in order.
+pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+    csv::HEADER.split(',')
+}
 
 /// How many of them there is a number in at every position.
 pub(crate) const ALWAYS: usize = 3;

@@ -74,3 +74,4 @@ pub mod view;
 
 pub use error::{Error, Result};
 pub use skin::Which;
+pub use svg::escaped;

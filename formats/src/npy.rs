@@ -16,7 +16,8 @@ const ALIGNED: usize = 64;
 
 /// Writes a path.
 pub(crate) fn write(path: &[Waypoint], out: &mut impl Write) -> io::Result<()> {
-    let fields = columns::NAMES.map(|name| format!("('{name}', '<f8')"));
+    let fields = columns::names().map(|name| format!("('{name}', '<f8')"));
+    let fields: Vec<String> = fields.collect();
     let mut header = format!(
         "{{'descr': [{}], 'fortran_order': False, 'shape': ({},), }}",
         fields.join(", "),

@@ -35,7 +35,7 @@ fn table(path: &[Waypoint], out: &mut (impl Write + Send)) -> Result<()> {
     let mut writer = SerializedFileWriter::new(out, schema()?, Arc::new(properties))?;
     for group in path.chunks(GROUP) {
         let mut rows = writer.next_row_group()?;
-        for k in 0..columns::NAMES.len() {
+        for k in 0..columns::names().count() {
             let column = group.iter().map(|w| columns::of(w)[k]);
             let there: Vec<f64> = column.clone().flatten().collect();
             let levels: Option<Vec<i16>> =
@@ -53,7 +53,7 @@ fn table(path: &[Waypoint], out: &mut (impl Write + Send)) -> Result<()> {
 }
 
 fn schema() -> Result<Arc<Type>> {
-    let column = |(k, name): (usize, &&str)| {
+    let column = |(k, name): (usize, &str)| {
         let repetition = if k < columns::ALWAYS {
             Repetition::REQUIRED
         } else {
@@ -62,7 +62,7 @@ fn schema() -> Result<Arc<Type>> {
         let column = Type::primitive_type_builder(name, Physical::DOUBLE);
         Ok(Arc::new(column.with_repetition(repetition).build()?))
     };
-    let all: Result<Vec<_>> = columns::NAMES.iter().enumerate().map(column).collect();
+    let all: Result<Vec<_>> = columns::names().enumerate().map(column).collect();
     let path = Type::group_type_builder("path").with_fields(all?);
     Ok(Arc::new(path.build()?))
 }

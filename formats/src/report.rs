@@ -29,8 +29,7 @@ pub struct Report {
     pub version: String,
     /// The job in effect, keyed as a job file is.
     pub job: Value,
-    /// The part's files, each with the unit of its lengths; none in a report of an older version.
-    #[serde(default)]
+    /// The part's files, each with the unit of its lengths.
     pub files: Vec<Source>,
     /// What the machinist should know, such as the open edges of a mesh.
     pub warnings: Vec<String>,
@@ -39,7 +38,6 @@ pub struct Report {
     /// How the path compares with the designed surface; nothing if that was skipped.
     pub verification: Option<Verification>,
     /// The surface that the path leaves; nothing if that was not looked at.
-    #[serde(default)]
     pub machined: Option<MachinedStatistics>,
     /// The program for the machine; nothing if none was written.
     pub program: Option<ProgramStatistics>,
@@ -47,7 +45,6 @@ pub struct Report {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub keep_outs: Vec<Raised>,
     /// What the roughing leaves; nothing if the job speaks of none.
-    #[serde(default)]
     pub roughing: Option<RoughStatistics>,
     /// What the last measures; nothing if the job speaks of none.
     #[serde(default)]
@@ -151,7 +148,6 @@ pub struct ProgramStatistics {
     /// Its files, in the order in which they are run.
     pub files: Vec<String>,
     /// Its passes, in their order.
-    #[serde(default)]
     pub passes: Vec<PassStatistics>,
     /// How long the cutter is at work, s: from the first position to the last of each pass.
     pub seconds: f64,

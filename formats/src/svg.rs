@@ -59,7 +59,8 @@ pub(crate) fn push(out: &mut String, what: std::fmt::Arguments) {
     let _ = out.write_fmt(what);
 }
 
-pub(crate) fn escaped(text: &str) -> String {
+/// Text as SVG and HTML take it.
+pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

@@ -1,6 +1,6 @@
 //! The report as one page of HTML, with its diagrams in it.
 
-use horma_formats::plot;
+use horma_formats::{escaped, plot};
 
 use crate::report::{Block, Chapter, Table, Verdict, of_claims};
 use crate::{INTRODUCTION, TITLE, command};
@@ -81,10 +81,4 @@ fn worded(text: &str) -> String {
             }
         })
         .collect()
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
 }

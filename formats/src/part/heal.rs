@@ -37,7 +37,8 @@ pub fn heal(name: &str, mesh: &mut Mesh) -> Result<Vec<Warning>> {
         vertices,
     });
     let tolerance = CRACK.min(RELATIVE * size(&vertices));
-    let near = near_places(&vertices, &triangles, tolerance);
+    let sides = edges(&triangles);
+    let near = near_places(&vertices, &sides, tolerance);
     let cracks = join(&mut triangles, &near);
     let collapsed = drop_collapsed(&mut triangles);
     tell(collapsed, |name, facets| Warning::CollapsedFacets {
@@ -49,7 +50,11 @@ pub fn heal(name: &str, mesh: &mut Mesh) -> Result<Vec<Warning>> {
         name,
         facets,
     });
-    let turned = orient(&vertices, &mut triangles);
+    let sides = match cracks + collapsed + twice {
+        0 => sides,
+        _ => edges(&triangles),
+    };
+    let turned = orient(&vertices, &mut triangles, &sides);
     tell(turned.facets, |name, facets| Warning::FlippedFacets {
         name,
         facets,
@@ -95,10 +100,10 @@ fn same_places(vertices: &[Point]) -> Vec<u32> {
 
 /// For each vertex at an open edge the nearest earlier one at another that is within the tolerance, and
 /// for each other vertex itself.
-fn near_places(vertices: &[Point], triangles: &[[u32; 3]], tolerance: f64) -> Vec<u32> {
+fn near_places(vertices: &[Point], edges: &[Edge], tolerance: f64) -> Vec<u32> {
     let mut places: Vec<u32> = (0..vertices.len() as u32).collect();
     let mut open = Vec::new();
-    for same in edges(triangles).chunk_by(|a, b| a.ends == b.ends) {
+    for same in edges.chunk_by(|a, b| a.ends == b.ends) {
         if let [alone] = same {
             open.extend([alone.ends.0, alone.ends.1]);
         }
@@ -223,8 +228,7 @@ struct Shell {
 
 /// Turns triangles so that those of a shell face the same way, and closed shells outwards; a shell that
 /// faces inwards within another may be meant as a cavity, and stays.
-fn orient(vertices: &[Point], triangles: &mut [[u32; 3]]) -> Turned {
-    let edges = edges(triangles);
+fn orient(vertices: &[Point], triangles: &mut [[u32; 3]], edges: &[Edge]) -> Turned {
     let count = triangles.len();
     // For each triangle those beside it, and whether they run along the common edge the same way.
     let mut beside: Vec<[Option<(u32, bool)>; 3]> = vec![[None; 3]; count];
