@@ -665,7 +665,7 @@ position, so it digitizes few of them, see --thin; it is compared with brute for
 #[derive(Debug, Args)]
 pub(crate) struct Papers {
     /// What to reproduce [default: everything]
-    #[arg(value_name = "NAME", value_parser = experiments())]
+    #[arg(value_name = "NAME", value_parser = one_of(Experiment::ALL, Experiment::name))]
     pub names: Vec<Experiment>,
     /// Directory for papers.md, papers.html and papers/; created if missing. What else is in it stays
     #[arg(short, long, value_name = "DIR")]
@@ -687,7 +687,7 @@ pub(crate) struct BenchScaling {
     #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "1,2,4,8", value_parser = clap::value_parser!(u32).range(1..=256))]
     pub workers: Vec<u32>,
     /// How workers come by the part; a mesh has no surface
-    #[arg(long, value_name = "D,...", value_delimiter = ',', value_parser = distributions(), default_values_t = Distribution::ALL)]
+    #[arg(long, value_name = "D,...", value_delimiter = ',', value_parser = one_of(Distribution::ALL, Distribution::name), default_values_t = Distribution::ALL)]
     pub distribution: Vec<Distribution>,
     /// How the touch is searched
     #[arg(long, value_name = "M,...", value_delimiter = ',', default_values_t = Search::ALL)]
@@ -718,19 +718,14 @@ pub(crate) struct BenchScaling {
     pub quiet: bool,
 }
 
-fn experiments() -> impl TypedValueParser<Value = Experiment> {
-    let known = PossibleValuesParser::new(Experiment::ALL.map(Experiment::name));
-    known.try_map(|typed| {
-        let found = Experiment::ALL.into_iter().find(|e| e.name() == typed);
-        found.ok_or("not an experiment")
-    })
-}
-
-fn distributions() -> impl TypedValueParser<Value = Distribution> {
-    let known = PossibleValuesParser::new(Distribution::ALL.map(Distribution::name));
-    known.try_map(|typed| {
-        let found = Distribution::ALL.into_iter().find(|d| d.name() == typed);
-        found.ok_or("not a distribution")
+/// One of `all`, by its name.
+fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
+    all: [T; N],
+    name: fn(T) -> &'static str,
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(all.map(name)).try_map(move |typed| {
+        let found = all.into_iter().find(|one| name(*one) == typed);
+        found.ok_or("not one of them")
     })
 }
 

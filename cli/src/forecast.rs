@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use crate::args;
 use crate::error::Result;
-use crate::progress::{Audience, Display};
+use crate::progress::{Audience, Display, Event};
 use crate::run::{Prepared, check_divisible, read};
 use crate::{say, system};
 
@@ -32,7 +32,7 @@ const ENOUGH: Duration = Duration::from_secs(1);
 
 /// What a job would be.
 #[derive(Debug, Serialize)]
-struct Forecast {
+pub(crate) struct Forecast {
     files: Vec<PathBuf>,
     warnings: Vec<String>,
     bodies: Vec<BodyRecord>,
@@ -86,27 +86,24 @@ struct Seconds {
 pub(crate) fn tell(args: &args::Run) -> Result<()> {
     let audience = args.job.how.audience();
     let display = Display::new(audience);
-    display.tell("read", 0, 0);
-    let prepared = read(&args.job.file, &args.job.how.overrides(args.workers))?;
-    let forecast = forecast(args, prepared, &display);
+    let forecast = forecast(args, &display);
     display.finish();
     let forecast = forecast.inspect_err(|error| display.failed(error))?;
-    match audience {
-        Audience::Programs => {
-            say(&serde_json::json!({ "event": "plan", "plan": forecast }).to_string());
-        }
-        Audience::People | Audience::Nobody => say(forecast.to_string().trim_end()),
+    display.event(&Event::Plan { plan: &forecast });
+    if audience != Audience::Programs {
+        say(forecast.to_string().trim_end());
     }
     Ok(())
 }
 
-fn forecast(args: &args::Run, prepared: Prepared, display: &Display) -> Result<Forecast> {
+fn forecast(args: &args::Run, display: &Display) -> Result<Forecast> {
+    display.tell("read", 0, 0);
     let Prepared {
         part,
         file,
         warnings,
         ..
-    } = prepared;
+    } = read(&args.job.file, &args.job.how.overrides(args.workers))?;
     let JobFile { job, cluster, .. } = &file;
     let available = system::memory();
     let distribution = match cluster.workers {

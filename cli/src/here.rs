@@ -8,10 +8,30 @@ use horma_core::{
 };
 use horma_master::Outcome;
 use tokio_util::sync::CancellationToken;
+use tracing::Span;
 
 use crate::error::{Error, Result};
 use crate::progress::Display;
+use crate::run::unless;
 use crate::system;
+
+/// Digitizes a part for one job after the other, beside the runtime, until `stop`.
+pub(crate) async fn run_all(
+    part: Part,
+    jobs: Vec<Job>,
+    threads: usize,
+    simd: Simd,
+    display: Display,
+    stop: CancellationToken,
+) -> Result<Vec<Outcome>> {
+    let (stopped, span) = (stop.clone(), Span::current());
+    let all = move || {
+        let run = |job| run(&part, job, threads, simd, &display, &stopped);
+        span.in_scope(|| jobs.into_iter().map(run).collect())
+    };
+    let all = tokio::task::spawn_blocking(all);
+    unless(stop, async { all.await.unwrap_or(Err(Error::Interrupted)) }).await
+}
 
 /// Digitizes a part on `threads` threads of this process, until `stop`.
 pub(crate) fn run(

@@ -7,6 +7,7 @@ mod error;
 
 mod passes;
 mod program;
+mod results;
 mod run;
 
 mod client;

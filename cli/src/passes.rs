@@ -2,12 +2,14 @@
 //! and what each of them cuts.
 
 use horma_core::{
-    Clearances, Layer, Point, Raised, Solid, ToolPath, Verification, deepest_cut, keep_out, layers,
+    Clearances, Job, Layer, Part, Point, Raised, Solid, ToolPath, Verification, deepest_cut,
+    keep_out, layers,
 };
 use horma_formats::job::{JobFile, Roughing};
 use horma_formats::report::Left;
 
 use crate::error::{Error, Result};
+use crate::verify;
 
 /// Every pass of a job, in the order in which they are cut.
 pub(crate) struct Passes {
@@ -100,7 +102,7 @@ fn uncut(file: &JobFile, raised: &[Raised]) -> Vec<String> {
 ///
 /// # Errors
 /// [`Error::RoughTooDeep`] if it comes closer to the part than its allowance less the job's `tolerance`.
-pub(crate) fn left(
+fn left(
     roughing: &Roughing,
     verified: (&Verification, &Clearances),
     finish: &Clearances,
@@ -138,4 +140,46 @@ pub(crate) fn left(
         max: excess.max,
     });
     Ok((left, Some(taken.fold(0.0, f64::max))))
+}
+
+/// What verifying the passes found.
+pub(crate) struct Verified {
+    pub finish: (Verification, Clearances),
+    /// What the roughing leaves, and the most that the finishing pass takes of it.
+    pub roughing: Option<(Option<Left>, Option<f64>)>,
+}
+
+/// Verifies the finishing pass and the last layer of the roughing beside the runtime, and refuses one that
+/// gouges deeper than the job's tolerance.
+pub(crate) async fn verified(
+    part: &Part,
+    file: &JobFile,
+    passes: &Passes,
+    threads: usize,
+) -> Result<Verified> {
+    let (part, file) = (part.clone(), file.clone());
+    let finish = passes.finish.positions();
+    // What none of the layers before goes below.
+    let rough = passes.layers.last().map(|layer| layer.path.positions());
+    let checking = tokio::task::spawn_blocking(move || {
+        let finish = verify::check(&part, &file.job, &finish, None, threads)?;
+        let tolerance = verify::tolerance(&file);
+        if let Some(tolerance) = tolerance {
+            verify::hold(&finish.0, tolerance, file.job.motion.path_tolerance)?;
+        }
+        let roughing = match file.roughing.zip(rough) {
+            None => None,
+            Some((roughing, positions)) => {
+                let job = Job {
+                    motion: roughing.motion,
+                    ..file.job
+                };
+                let (found, rough) = verify::check(&part, &job, &positions, None, threads)?;
+                let left = left(&roughing, (&found, &rough), &finish.1, tolerance)?;
+                Some(left)
+            }
+        };
+        Ok(Verified { finish, roughing })
+    });
+    checking.await.unwrap_or(Err(Error::Interrupted))
 }

@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 
 use crate::error::Error;
+use crate::forecast::Forecast;
 
 /// How often plain lines tell of a phase that takes long.
 const LINE_EVERY: Duration = Duration::from_secs(5);
@@ -51,6 +52,10 @@ pub(crate) enum Event<'a> {
     },
     Note {
         text: &'a str,
+    },
+    /// What the job would be: `--dry-run`.
+    Plan {
+        plan: &'a Forecast,
     },
     /// A master has taken the job in.
     Submitted {

@@ -1,27 +1,20 @@
 //! `run` and `submit`: from a job file to its results. They differ only in who computes.
 
-use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::Arc;
-use std::thread;
 use std::time::Instant;
 
-use horma_core::{
-    Clearances, Counters, Job, Machined, Method, Part, Phase, Record, Shaped, Simd, ToolPath,
-    Verification, Waypoint, place,
-};
-use horma_formats::also::{self, Sources};
+use horma_core::{Job, Method, Part, Phase, Record, Shaped, Simd, ToolPath, place};
+use horma_formats::csv;
 use horma_formats::job::{self, JobFile, Overrides};
-use horma_formats::output::Staging;
+use horma_formats::output::{self, Staging};
 use horma_formats::part::{self, Assembled, Source};
-use horma_formats::report::{self, Left, PathStatistics, Report, RoughStatistics};
-use horma_formats::view::Findings;
-use horma_formats::{csv, map, output, preview, view};
+use horma_formats::report::{self, PathStatistics, Report, RoughStatistics};
 use horma_master::{Outcome, Progress};
 use horma_proto::{VERSION, trace};
 use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
-use tracing::info_span;
+use tracing::{Instrument, info_span};
 
 use crate::args::{self, How};
 use crate::client::Remote;
@@ -29,12 +22,10 @@ use crate::cluster::Workers;
 use crate::error::{Error, Result};
 use crate::examine::{Subject, examine};
 use crate::machined::FOR_REPORT;
-use crate::passes::Passes;
 use crate::progress::{Audience, Display, Event};
+use crate::results::{self, Made};
 use crate::serve::{NOTICE, runtime};
-use crate::{
-    cluster, forecast, here, lasts, passes, program, say, sizes, submit, system, verify, watch,
-};
+use crate::{cluster, forecast, here, lasts, passes, say, sizes, submit, system, watch};
 
 /// A job and where its results go.
 pub(crate) struct Asked<'a> {
@@ -74,14 +65,8 @@ fn one(args: &args::Run, output: &Path, stop: &CancellationToken) -> Result<()> 
             let (workers, sharing) = (file.cluster.workers, file.cluster.sharing);
             if workers == 0 {
                 let threads = threads.unwrap_or_else(system::cores);
-                let stopped = stop.clone();
-                let run = move || {
-                    let run = |job| here::run(&part, job, threads, simd, &display, &stopped);
-                    targets.into_iter().map(run).collect()
-                };
-                let span = info_span!("digitize");
-                let run = tokio::task::spawn_blocking(move || span.in_scope(run));
-                return unless(stop, async { run.await.unwrap_or(Err(Error::Interrupted)) }).await;
+                let run = here::run_all(part, targets, threads, simd, display, stop);
+                return run.instrument(info_span!("digitize")).await;
             }
             let progress = progress(display);
             let workers = Workers {
@@ -342,7 +327,7 @@ fn perform(
     let directory = asked.output;
     display.event(&Event::Done { directory });
     if audience == Audience::People {
-        summarize(directory, &report);
+        results::summarize(directory, &report);
     }
     Ok(())
 }
@@ -415,7 +400,7 @@ pub(crate) async fn carry_out(
     } else {
         display.tell("verify", 0, 0);
         let begin = Instant::now();
-        let verifying = verified(&part, &file, &passes, threads);
+        let verifying = passes::verified(&part, &file, &passes, threads);
         let verifying = trace::within(info_span!("verify"), verifying);
         let found = unless(stop.clone(), verifying).await?;
         record.phases.push(phase("verify", begin));
@@ -470,7 +455,7 @@ pub(crate) async fn carry_out(
         clearances,
         surface: found.surface,
     };
-    let writing = || write(asked, &made, report, display, stop);
+    let writing = || results::write(asked, &made, report, display, stop);
     info_span!("write").in_scope(writing)
 }
 
@@ -490,142 +475,6 @@ fn of_finish(outcomes: Vec<Outcome>) -> (Vec<ToolPath>, Record) {
     (paths, last)
 }
 
-/// What verifying the passes found.
-struct Verified {
-    finish: (Verification, Clearances),
-    /// What the roughing leaves, and the most that the finishing pass takes of it.
-    roughing: Option<(Option<Left>, Option<f64>)>,
-}
-
-/// Verifies the finishing pass and the last layer of the roughing beside the runtime, and refuses one that
-/// gouges deeper than the job's tolerance.
-async fn verified(
-    part: &Part,
-    file: &JobFile,
-    passes: &Passes,
-    threads: usize,
-) -> Result<Verified> {
-    let (part, file) = (part.clone(), file.clone());
-    let finish = passes.finish.positions();
-    // What none of the layers before goes below.
-    let rough = passes.layers.last().map(|layer| layer.path.positions());
-    let checking = tokio::task::spawn_blocking(move || {
-        let finish = verify::check(&part, &file.job, &finish, None, threads)?;
-        let tolerance = verify::tolerance(&file);
-        if let Some(tolerance) = tolerance {
-            verify::hold(&finish.0, tolerance, file.job.motion.path_tolerance)?;
-        }
-        let roughing = match file.roughing.zip(rough) {
-            None => None,
-            Some((roughing, positions)) => {
-                let job = Job {
-                    motion: roughing.motion,
-                    ..file.job
-                };
-                let (found, rough) = verify::check(&part, &job, &positions, None, threads)?;
-                let left = passes::left(&roughing, (&found, &rough), &finish.1, tolerance)?;
-                Some(left)
-            }
-        };
-        Ok(Verified { finish, roughing })
-    });
-    checking.await.unwrap_or(Err(Error::Interrupted))
-}
-
-/// What results are written of.
-struct Made {
-    part: Part,
-    file: JobFile,
-    passes: Passes,
-    clearances: Option<Clearances>,
-    surface: Option<Machined>,
-}
-
-/// Writes all results, or none.
-fn write(
-    asked: &Asked,
-    made: &Made,
-    mut report: Report,
-    display: &Display,
-    stop: &CancellationToken,
-) -> Result<Report> {
-    display.tell("write", 0, 0);
-    let begin = Instant::now();
-    let going_on = || {
-        if stop.is_cancelled() {
-            Err(Error::Interrupted)
-        } else {
-            Ok(())
-        }
-    };
-    let staging = Staging::begin(asked.output)?;
-    let heading = [
-        ("job", &*asked.file.to_string_lossy()),
-        ("cutter", &described(&report.job["cutter"])),
-    ];
-    let Made {
-        part, file, passes, ..
-    } = made;
-    let path = &passes.finish;
-    // What is to be looked at takes about as long as the rest.
-    let (drawn, seen, written) = thread::scope(|scope| {
-        let looking = scope.spawn(|| {
-            let sheets = preview::sheets(part);
-            let drawn = preview::save(&staging.file(output::PREVIEW), &sheets, path);
-            let waypoints: Vec<Waypoint> = path.waypoints().collect();
-            let findings = Findings {
-                clearances: made.clearances.as_ref(),
-                machined: made.surface.as_ref(),
-            };
-            let (cutter, trajectory) = (&file.job.cutter, Some(&path.trajectory));
-            let seen = view::view(&sheets, cutter, &waypoints, trajectory, findings);
-            let sources = Sources {
-                path: &waypoints,
-                part: &sheets,
-                machined: made.surface.as_ref(),
-            };
-            let mut asked = file.also.iter();
-            let also = asked.try_for_each(|a| also::save(*a, staging.dir(), &sources));
-            (drawn, seen, also)
-        });
-        let written = program::write(staging.dir(), passes, file, &heading)?;
-        going_on()?;
-        csv::save(&staging.file(output::PATH), path)?;
-        for (number, layer) in (1..).zip(&passes.layers) {
-            going_on()?;
-            csv::save(&staging.file(&output::rough_name(number)), &layer.path)?;
-        }
-        if let Some(surface) = &made.surface {
-            map::save(&staging.file(output::MACHINED_MAP), surface)?;
-        }
-        let (drawn, seen, also) = looking.join().unwrap_or_else(|panic| resume_unwind(panic));
-        also?;
-        Ok::<_, Error>((drawn, seen, written))
-    })?;
-    going_on()?;
-    report.program = Some(written);
-    // Nobody turns a picture: a path without one is as good.
-    if let Err(error) = drawn {
-        let warning = format!("there is no picture: {error}");
-        display.warn(&warning);
-        report.warnings.push(warning);
-    }
-    report.record.phases.push(phase("write", begin));
-    report::save(&staging.file(output::REPORT), &report)?;
-    view::save(&staging.file(output::VIEW), &seen, &report)?;
-    staging.publish()?;
-    Ok(report)
-}
-
-/// A table of the job in words.
-fn described(table: &serde_json::Value) -> String {
-    let entries = table.as_object().into_iter().flatten();
-    let entries: Vec<String> = entries
-        .map(|(key, value)| format!("{key} {value}"))
-        .collect();
-    entries.join(", ")
-}
-
 pub(crate) fn phase(name: &str, begin: Instant) -> Phase {
     Phase {
         name: name.to_owned(),
@@ -635,73 +484,4 @@ pub(crate) fn phase(name: &str, begin: Instant) -> Phase {
 
 pub(crate) fn progress(display: Display) -> Progress {
     Arc::new(move |phase, done, total| display.tell(phase, done, total))
-}
-
-/// What the user wants to know at once.
-fn summarize(dir: &Path, report: &Report) {
-    let lost = match report.record.lost.len() {
-        0 => String::new(),
-        n => format!(
-            "\n{n} attempts were lost and made again: see {}",
-            output::REPORT
-        ),
-    };
-    let window = report.record.window.map_or(String::new(), |window| {
-        let Counters {
-            lost, largest_loss, ..
-        } = report.record.counters;
-        format!(
-            "\nwindows of {} rows and {} columns lost the winner {lost} times, by {largest_loss:.4} mm at most",
-            window.delta_u, window.delta_v
-        )
-    });
-    let verification = report.verification.as_ref();
-    let verification = verification.map_or(String::new(), |v| format!("\n{}", verify::describe(v)));
-    let machined = report.machined.as_ref().map_or(String::new(), |m| {
-        format!("\nas machined: {}", m.describe())
-    });
-    let path = &report.path;
-    let inserted = match path.inserted {
-        0 => String::new(),
-        n => format!(", {n} of them inserted"),
-    };
-    let beyond = match path.beyond_tolerance {
-        0 => String::new(),
-        n => format!(
-            "\n{n} straight moves stray farther than the path tolerance: there the height jumps"
-        ),
-    };
-    let rough = report.roughing.map_or(String::new(), |rough| {
-        let left = rough.left.map_or(String::new(), |l| {
-            format!(
-                ", which leave {:.4} / {:.4} / {:.4} mm (least / median / 99 %)",
-                l.least, l.median, l.p99
-            )
-        });
-        format!("\nroughing in {} layers{left}", rough.layers)
-    });
-    let (cutting, programs) = report.program.as_ref().map_or_else(Default::default, |p| {
-        let names = [
-            p.files.first(),
-            p.files.last().filter(|_| p.files.len() > 1),
-        ];
-        let names = names.into_iter().flatten().map(|name| dir.join(name));
-        let names: Vec<String> = names.map(|n| n.display().to_string()).collect();
-        (program::describe(p), names.join(" to "))
-    });
-    let also = report.job["output"]["also"].as_array();
-    let also = also.into_iter().flatten().filter_map(|name| name.as_str());
-    let map = report.machined.as_ref().map(|_| output::MACHINED_MAP);
-    let files = [output::REPORT, output::PREVIEW].into_iter().chain(map);
-    let files = files.chain(also).chain([output::VIEW]);
-    let files: Vec<String> = files
-        .map(|name| dir.join(name).display().to_string())
-        .collect();
-    say(&format!(
-        "{} positions{inserted}, {} without contact{beyond}{lost}{window}{verification}{machined}{rough}\n{cutting}\n{}\n{programs}\n{}",
-        path.positions,
-        path.without_contact,
-        dir.join(output::PATH).display(),
-        files.join("\n"),
-    ));
 }

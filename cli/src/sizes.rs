@@ -182,15 +182,7 @@ async fn one(
                     let (sharing, progress) = (file.cluster.sharing, progress(display));
                     unless(stop, local.run_all(part, targets, sharing, &progress)).await
                 }
-                None => {
-                    let stopped = stop.clone();
-                    let run = move || {
-                        let run = |job| here::run(&part, job, threads, simd, &display, &stopped);
-                        targets.into_iter().map(run).collect()
-                    };
-                    let run = tokio::task::spawn_blocking(run);
-                    unless(stop, async { run.await.unwrap_or(Err(Error::Interrupted)) }).await
-                }
+                None => here::run_all(part, targets, threads, simd, display, stop).await,
             }
         };
     let carrying = carry_out(
