@@ -34,23 +34,27 @@ const DISTRIBUTIONS: [&str; 3] = ["overlap", "halo", "surface"];
 /// Any number of workers, however they come by the part, against one process.
 fn check_workers(job: &Path, distributions: &[&str], counts: &[usize]) {
     for contact in ["facet", "point"] {
-        let dir = scratch();
-        let contact = ["--contact", contact];
-        let alone = path_of(job, dir.path(), "alone", &contact);
-        for distribution in distributions {
-            for count in counts {
-                let name = format!("{distribution}-{count}");
-                let workers = count.to_string();
-                let args = ["--workers", &workers, "--distribution", distribution];
-                let path = path_of(job, dir.path(), &name, &[&args, &contact[..]].concat());
-                assert!(path == alone, "{} on {name}, {contact:?}", job.display());
-                let report = report(&dir.path().join(&name));
-                assert_eq!(report["job"]["cluster"]["distribution"], *distribution);
-                let extents = report["extents"].as_array().expect("extents");
-                assert_eq!(extents.len(), *count, "each worker had its extent");
-                assert_eq!(report["lost"].as_array().map(Vec::len), Some(0));
-                check_traffic(distribution, &report);
-            }
+        check_contact(job, contact, distributions, counts);
+    }
+}
+
+fn check_contact(job: &Path, contact: &str, distributions: &[&str], counts: &[usize]) {
+    let dir = scratch();
+    let contact = ["--contact", contact];
+    let alone = path_of(job, dir.path(), "alone", &contact);
+    for distribution in distributions {
+        for count in counts {
+            let name = format!("{distribution}-{count}");
+            let workers = count.to_string();
+            let args = ["--workers", &workers, "--distribution", distribution];
+            let path = path_of(job, dir.path(), &name, &[&args, &contact[..]].concat());
+            assert!(path == alone, "{} on {name}, {contact:?}", job.display());
+            let report = report(&dir.path().join(&name));
+            assert_eq!(report["job"]["cluster"]["distribution"], *distribution);
+            let extents = report["extents"].as_array().expect("extents");
+            assert_eq!(extents.len(), *count, "each worker had its extent");
+            assert_eq!(report["lost"].as_array().map(Vec::len), Some(0));
+            check_traffic(distribution, &report);
         }
     }
 }
@@ -93,9 +97,16 @@ fn check_traffic(distribution: &str, report: &Value) {
     }
 }
 
+const COUNTS: [usize; 6] = [1, 2, 3, 5, 8, 16];
+
 #[test]
-fn the_sample_is_the_same_on_any_number_of_workers() {
-    check_workers(&sample(), &DISTRIBUTIONS, &[1, 2, 3, 5, 8, 16]);
+fn facets_of_the_sample_are_the_same_on_any_number_of_workers() {
+    check_contact(&sample(), "facet", &DISTRIBUTIONS, &COUNTS);
+}
+
+#[test]
+fn points_of_the_sample_are_the_same_on_any_number_of_workers() {
+    check_contact(&sample(), "point", &DISTRIBUTIONS, &COUNTS);
 }
 
 #[test]
