@@ -6,7 +6,6 @@
 
 use std::ops::Range;
 
-use fearless_simd::Simd as Vectors;
 use rayon::prelude::*;
 
 use crate::between::{self, Probe};
@@ -22,7 +21,7 @@ use crate::motion::{Motion, Trajectory};
 use crate::path::{SubTrajectory, Touch};
 use crate::record::Counters;
 use crate::row::{Row, starts};
-use crate::simd::{Simd, with_simd};
+use crate::simd::{Simd, Token};
 use crate::sweep::{self, AllFacets, Sweep};
 use crate::tree::{Start, Tree};
 
@@ -47,7 +46,7 @@ pub struct Digitizer {
     cutter: Cutter,
     /// How far straight moves may stray, mm.
     path_tolerance: Option<f64>,
-    simd: Simd,
+    simd: Token,
     search: Search,
 }
 
@@ -81,7 +80,7 @@ impl Digitizer {
         Self {
             cutter: job.cutter,
             path_tolerance: job.motion.path_tolerance,
-            simd,
+            simd: simd.token(),
             search,
         }
     }
@@ -179,43 +178,30 @@ impl Digitizer {
         trajectory: &Trajectory,
         poses: impl Iterator<Item = Pose>,
     ) -> (Vec<Option<Touch>>, Counters) {
-        let (cutter, revolution) = (&self.cutter, trajectory.points_per_revolution as usize);
+        let (cutter, simd) = (&self.cutter, self.simd);
+        let revolution = trajectory.points_per_revolution as usize;
         match &self.search {
-            Search::Points(tree) => {
-                with_simd!(self.simd, simd => exact(simd, cutter, tree, revolution, poses))
-            }
-            Search::Facets(tree) => {
-                with_simd!(self.simd, simd => exact(simd, cutter, tree, revolution, poses))
-            }
-            Search::AllPoints(sweep) => {
-                with_simd!(self.simd, simd => sweep::run(simd, cutter, sweep, poses))
-            }
+            Search::Points(tree) => exact(simd, cutter, tree, revolution, poses),
+            Search::Facets(tree) => exact(simd, cutter, tree, revolution, poses),
+            Search::AllPoints(sweep) => sweep::run(simd, cutter, sweep, poses),
             Search::AllFacets(facets) => facets.run(cutter, poses),
             Search::Windows {
                 grids,
                 tree,
                 window,
-            } => with_simd!(self.simd, simd => {
-                local::run(simd, cutter, grids, tree, *window, poses)
-            }),
+            } => local::run(simd, cutter, grids, tree, *window, poses),
         }
     }
 
     /// What is touched between positions. Windows follow a winner from position to position, so that
     /// the hierarchy, which they fall back on anyway, does it for them.
     fn search_near(&self, probes: &[Probe], counters: &mut Counters) -> Vec<Option<Touch>> {
-        let cutter = &self.cutter;
+        let (cutter, simd) = (&self.cutter, self.simd);
         let poses = probes.iter().map(|p| p.pose);
         let (touches, cost) = match &self.search {
-            Search::Points(tree) | Search::Windows { tree, .. } => {
-                with_simd!(self.simd, simd => near(simd, cutter, tree, probes))
-            }
-            Search::Facets(tree) => {
-                with_simd!(self.simd, simd => near(simd, cutter, tree, probes))
-            }
-            Search::AllPoints(sweep) => {
-                with_simd!(self.simd, simd => sweep::run(simd, cutter, sweep, poses))
-            }
+            Search::Points(tree) | Search::Windows { tree, .. } => near(simd, cutter, tree, probes),
+            Search::Facets(tree) => near(simd, cutter, tree, probes),
+            Search::AllPoints(sweep) => sweep::run(simd, cutter, sweep, poses),
             Search::AllFacets(facets) => facets.run(cutter, poses),
         };
         *counters += cost;
@@ -228,7 +214,7 @@ impl Digitizer {
 pub struct Heuristic {
     grids: Grids,
     cutter: Cutter,
-    simd: Simd,
+    simd: Token,
     poses: Vec<Pose>,
     exact: Vec<Option<Touch>>,
 }
@@ -260,7 +246,7 @@ impl Heuristic {
         Self {
             grids: Grids::new(rows, local.culling),
             cutter: job.cutter,
-            simd,
+            simd: simd.token(),
             poses: poses(trajectory, &trajectory.directions(), positions).collect(),
             exact,
         }
@@ -290,9 +276,8 @@ impl Heuristic {
     /// Stops once more than `allowed` positions are wrong.
     fn chain(&self, window: Window, allowed: u64) -> (Vec<Option<Touch>>, Counters) {
         let (poses, exact) = (&self.poses, &self.exact);
-        with_simd!(self.simd, simd => {
-            local::chain(simd, &self.cutter, &self.grids, window, poses, exact, allowed)
-        })
+        let (cutter, grids) = (&self.cutter, &self.grids);
+        local::chain(self.simd, cutter, grids, window, poses, exact, allowed)
     }
 }
 
@@ -328,9 +313,8 @@ fn facet_tree(rows: &[Row]) -> Tree<FacetLeaf> {
     })
 }
 
-#[inline(always)]
-fn exact<S: Vectors, L: Leaf>(
-    simd: S,
+fn exact<L: Leaf>(
+    simd: Token,
     cutter: &Cutter,
     tree: &Tree<L>,
     revolution: usize,
@@ -368,9 +352,8 @@ fn exact<S: Vectors, L: Leaf>(
 }
 
 /// The same for probes, each with what is touched beside it.
-#[inline(always)]
-fn near<S: Vectors, L: Leaf>(
-    simd: S,
+fn near<L: Leaf>(
+    simd: Token,
     cutter: &Cutter,
     tree: &Tree<L>,
     probes: &[Probe],

@@ -139,7 +139,7 @@ mod tests {
             let angle = f64::from(degrees).to_radians();
             let pose = Pose { x, cos: libm::cos(angle), sin: libm::sin(angle) };
             for level in Level::available() {
-                let all = with_simd!(level, simd => eight(simd, &cutter, &pose, &points));
+                let all = with_simd!(level.token(), simd => eight(simd, &cutter, &pose, &points));
                 for (p, height) in points.iter().zip(all) {
                     let one = touch_point(&cutter, &pose, *p).map_or(f64::NEG_INFINITY, |t| t.height);
                     prop_assert_eq!(one.to_bits(), height.to_bits());

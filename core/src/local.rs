@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use fearless_simd::Simd;
+use fearless_simd::Simd as Vectors;
 
 use crate::blocks::runs;
 use crate::contact::Pose;
@@ -17,6 +17,7 @@ use crate::leaf::{Best, PointLeaf};
 use crate::path::Touch;
 use crate::record::Counters;
 use crate::row::{Row, RowKind, row_and_place};
+use crate::simd::{Token, with_simd};
 use crate::sweep::Sweep;
 use crate::tree::{Start, Tree};
 use crate::vector::{Interval, Point, cross, dot, length, sub};
@@ -42,7 +43,7 @@ struct Grid {
 }
 
 /// The last winner of each grid, as row and column.
-pub(crate) type Winners = Vec<Option<(usize, usize)>>;
+type Winners = Vec<Option<(usize, usize)>>;
 
 impl Grids {
     /// Of rows in order of their ids; slabs have no parameters and are left out.
@@ -73,14 +74,26 @@ impl Grids {
     }
 
     /// No winner yet on any grid.
-    pub fn start(&self) -> Winners {
+    fn start(&self) -> Winners {
         vec![None; self.grids.len()]
     }
 
     /// The highest point in the windows, which then move to what was found. Returns how many points
     /// were evaluated.
+    fn search(
+        &self,
+        simd: Token,
+        cutter: &Cutter,
+        pose: &Pose,
+        window: Window,
+        winners: &mut Winners,
+        best: &mut Best,
+    ) -> u64 {
+        with_simd!(simd, simd => self.search_by(simd, cutter, pose, window, winners, best))
+    }
+
     #[inline(always)]
-    pub fn search<S: Simd>(
+    fn search_by<S: Vectors>(
         &self,
         simd: S,
         cutter: &Cutter,
@@ -101,7 +114,7 @@ impl Grids {
             match *winner {
                 None => {
                     let all = grid.start..grid.start + grid.rows * grid.columns;
-                    evaluated += self.sweep.search(simd, cutter, pose, all, &mut own);
+                    evaluated += self.sweep.search_by(simd, cutter, pose, all, &mut own);
                 }
                 Some((row, column)) => {
                     let rows = around(row, window.delta_u, grid.rows);
@@ -110,7 +123,7 @@ impl Grids {
                         let start = grid.start + row * grid.columns;
                         for part in [&left, &right] {
                             let part = start + part.start..start + part.end;
-                            evaluated += self.sweep.search(simd, cutter, pose, part, &mut own);
+                            evaluated += self.sweep.search_by(simd, cutter, pose, part, &mut own);
                         }
                     }
                 }
@@ -126,7 +139,7 @@ impl Grids {
     }
 
     /// Moves the window of the grid that holds a point to it.
-    pub fn move_to(&self, winners: &mut Winners, id: u64) {
+    fn move_to(&self, winners: &mut Winners, id: u64) {
         let (row, _) = row_and_place(id);
         for (grid, winner) in self.grids.iter().zip(winners) {
             if (grid.first_row..grid.first_row + grid.rows as u32).contains(&row) {
@@ -138,9 +151,8 @@ impl Grids {
 
 /// The highest points for each of some poses, by windows that fall back on the hierarchy where they have
 /// lost the winner: it finds a point above theirs.
-#[inline(always)]
-pub(crate) fn run<S: Simd>(
-    simd: S,
+pub(crate) fn run(
+    simd: Token,
     cutter: &Cutter,
     grids: &Grids,
     tree: &Tree<PointLeaf>,
@@ -182,9 +194,8 @@ pub(crate) fn run<S: Simd>(
 
 /// The highest points for each of some poses by windows alone, held against the exact ones; it stops once
 /// more than `allowed` are wrong.
-#[inline(always)]
-pub(crate) fn chain<S: Simd>(
-    simd: S,
+pub(crate) fn chain(
+    simd: Token,
     cutter: &Cutter,
     grids: &Grids,
     window: Window,

@@ -109,6 +109,27 @@ impl Mesh {
         })
     }
 
+    /// A mesh of triangles that are given by their corners (mm): those of the same bits become one vertex.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] or [`Error::TooFar`]; `name` is for them.
+    pub fn of_corners(name: &str, corners: impl IntoIterator<Item = [Point; 3]>) -> Result<Self> {
+        let mut places = HashMap::new();
+        let mut vertices = Vec::new();
+        let triangles = corners.into_iter().map(|corners| {
+            corners.map(|corner| {
+                // −0 and 0 are the same place. More vertices than a u32 counts would take 100 GB.
+                let corner = corner.map(|c| c + 0.0);
+                *places.entry(corner.map(f64::to_bits)).or_insert_with(|| {
+                    vertices.push(corner);
+                    vertices.len() as u32 - 1
+                })
+            })
+        });
+        let triangles = triangles.collect();
+        Self::new(name, vertices, triangles)
+    }
+
     /// Vertices, mm.
     pub fn vertices(&self) -> &[Point] {
         &self.vertices

@@ -47,12 +47,13 @@ pub(crate) enum Token {
     Neon(Neon),
 }
 
-/// Evaluates `$run`, compiled for the instruction set `$level`, with `$simd` as its token. What `$run`
-/// calls has to be `#[inline(always)]`, and closures in it too.
+/// Evaluates `$run`, compiled for each instruction set and run by that of `$token`, with `$simd` as its
+/// proof. What `$run` calls has to be `#[inline(always)]`, and closures in it too. So little should be in it:
+/// all of it is compiled once for each instruction set and each place where this stands.
 macro_rules! with_simd {
-    ($level:expr, $simd:ident => $run:expr) => {{
+    ($token:expr, $simd:ident => $run:expr) => {{
         use fearless_simd::Simd as _;
-        match $crate::simd::Simd::token($level) {
+        match $token {
             $crate::simd::Token::Scalar($simd) => $simd.vectorize(
                 #[inline(always)]
                 || $run,

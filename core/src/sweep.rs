@@ -14,6 +14,7 @@ use crate::leaf::Best;
 use crate::path::Touch;
 use crate::record::Counters;
 use crate::row::{Facet, Row, facets};
+use crate::simd::{Token, with_simd};
 use crate::vector::Point;
 
 /// The points of rows, in order of their numbers.
@@ -55,14 +56,15 @@ impl Sweep {
         }
     }
 
-    /// All places.
-    pub fn all(&self) -> Range<usize> {
-        0..self.at[0].len() - LANES
+    /// Raises `best` to the highest of all points; returns how many were evaluated.
+    fn search(&self, simd: Token, cutter: &Cutter, pose: &Pose, best: &mut Best) -> u64 {
+        let all = 0..self.at[0].len() - LANES;
+        with_simd!(simd, simd => self.search_by(simd, cutter, pose, all, best))
     }
 
-    /// Raises `best` to the highest of the points at `places`; returns how many were evaluated.
+    /// The same for the points at `places`.
     #[inline(always)]
-    pub fn search<S: Simd>(
+    pub fn search_by<S: Simd>(
         &self,
         simd: S,
         cutter: &Cutter,
@@ -125,22 +127,19 @@ impl Sweep {
 }
 
 /// The highest of all points for each of some poses.
-#[inline(always)]
-pub(crate) fn run<S: Simd>(
-    simd: S,
+pub(crate) fn run(
+    simd: Token,
     cutter: &Cutter,
     sweep: &Sweep,
     poses: impl Iterator<Item = Pose>,
 ) -> (Vec<Option<Touch>>, Counters) {
-    // A loop and no closure: only what is written here is compiled for the instruction set.
     let mut counters = Counters::default();
-    let mut touches = Vec::with_capacity(poses.size_hint().0);
-    for pose in poses {
+    let touch = |pose: Pose| {
         let mut best = Best::above(f64::NEG_INFINITY);
-        counters.evaluations += sweep.search(simd, cutter, &pose, sweep.all(), &mut best);
-        touches.push(best.touch());
-    }
-    (touches, counters)
+        counters.evaluations += sweep.search(simd, cutter, &pose, &mut best);
+        best.touch()
+    };
+    (poses.map(touch).collect(), counters)
 }
 
 /// The facets of rows, with their numbers in the part.

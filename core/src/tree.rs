@@ -16,6 +16,7 @@ use crate::cutter::Cutter;
 use crate::lanes::LANES;
 use crate::leaf::{Best, Leaf};
 use crate::record::Counters;
+use crate::simd::{Token, with_simd};
 use crate::vector::{Interval, Point};
 
 /// The hierarchy.
@@ -82,8 +83,18 @@ impl<L: Leaf> Tree<L> {
     /// The highest of all candidates for each of up to eight positions, which go through the hierarchy
     /// together: where they are close to each other, most of the way is the same for all. `starts` tells
     /// where to look first; it does not change the result.
+    pub fn search(
+        &self,
+        simd: Token,
+        cutter: &Cutter,
+        starts: &[Start],
+        counters: &mut Counters,
+    ) -> [Best; LANES] {
+        with_simd!(simd, simd => self.search_by(simd, cutter, starts, counters))
+    }
+
     #[inline(always)]
-    pub fn search<S: Simd>(
+    fn search_by<S: Simd>(
         &self,
         simd: S,
         cutter: &Cutter,

@@ -197,8 +197,8 @@ mod tests {
             let roof = near.roof(&plane, &pose, middle, base);
             let lanes = corners.map(|p| sub(p, middle).map(|c| [c as f32; 8]));
             for level in Level::available() {
-                let bounds = with_simd!(level, simd => facets(simd, &cutter, &near, &lanes));
-                let under = with_simd!(level, simd => {
+                let bounds = with_simd!(level.token(), simd => facets(simd, &cutter, &near, &lanes));
+                let under = with_simd!(level.token(), simd => {
                     let corners = [load(simd, &lanes[0]), load(simd, &lanes[1]), load(simd, &lanes[2])];
                     *roof.above(simd, corners)
                 });

@@ -374,7 +374,7 @@ mod tests {
         let by = [0.0, 0.0, 1.0e-35, 1.0e-6, 1.0, 1.0, 0.0, 3.0];
         let bend = [-2.0, 2.0, -1.0e-3, -1.0, 2.0, -0.5, 0.0, 1.0e-35];
         for level in Level::available() {
-            let most = with_simd!(level, simd => rises(simd, by, bend));
+            let most = with_simd!(level.token(), simd => rises(simd, by, bend));
             for i in 0..=100 {
                 let s = i as f32 / 100.0;
                 for lane in 0..8 {
@@ -417,7 +417,7 @@ mod tests {
             let (points, frame, held) = under_a_lid(&points, shrink, far);
             let view = View::new(&frame, &cutter, &pose);
             for level in Level::available() {
-                let bounds = with_simd!(level, simd => lids(simd, &cutter, &view, place, &held));
+                let bounds = with_simd!(level.token(), simd => lids(simd, &cutter, &view, place, &held));
                 for &p in &points {
                     if let Some(touch) = touch_point(&cutter, &pose, p) {
                         prop_assert!(f64::from(bounds[3]) >= touch.height, "{level}");
@@ -447,7 +447,7 @@ mod tests {
             let view = View::new(&frame, &cutter, &poses[0]);
             let swing = Swing::new(poses.into_iter());
             for level in Level::available() {
-                let bounds = with_simd!(level, simd => swung(simd, &cutter, &view, &swing, place, &held));
+                let bounds = with_simd!(level.token(), simd => swung(simd, &cutter, &view, &swing, place, &held));
                 for (pose, bounds) in poses.iter().zip(bounds) {
                     for &p in &points {
                         if let Some(touch) = touch_point(&cutter, pose, p) {

@@ -5,8 +5,6 @@
 //! missing would be gouged. Read here and not by a library, because those that were tried trust the
 //! first word `solid`, stop silently at the first `endsolid`, and cannot say which line is wrong.
 
-use std::collections::HashMap;
-
 use horma_core::{Body, Mesh, Point, Shape};
 
 use super::{Loaded, Reading, Warning};
@@ -40,9 +38,13 @@ pub fn parse(name: &str, bytes: &[u8], reading: &Reading) -> Result<Loaded> {
             name: name.to_owned(),
         });
     }
+    let scale = reading.scale();
+    let facets = facets
+        .iter()
+        .map(|facet| facet.map(|corner| corner.map(|c| c * scale)));
     let body = Body {
         name: name.to_owned(),
-        shape: Shape::Mesh(weld(name, &facets, reading.scale())?),
+        shape: Shape::Mesh(Mesh::of_corners(name, facets)?),
     };
     Ok(Loaded {
         bodies: vec![body],
@@ -213,27 +215,6 @@ pub(super) fn shortened(line: &str) -> String {
         short.push('…');
     }
     short
-}
-
-/// A mesh of facets that are given by their corners, times `scale`: vertices of the same bits become one.
-///
-/// # Errors
-/// Those of [`Mesh::new`].
-fn weld(name: &str, facets: &[[Point; 3]], scale: f64) -> Result<Mesh> {
-    let mut places = HashMap::with_capacity(facets.len() / 2);
-    let mut vertices = Vec::with_capacity(facets.len() / 2);
-    let triangles = facets.iter().map(|corners| {
-        corners.map(|corner| {
-            // −0 and 0 are the same place. A file of 16 GiB has fewer vertices than a u32 counts.
-            let corner = corner.map(|c| c * scale + 0.0);
-            *places.entry(corner.map(f64::to_bits)).or_insert_with(|| {
-                vertices.push(corner);
-                vertices.len() as u32 - 1
-            })
-        })
-    });
-    let triangles = triangles.collect();
-    Ok(Mesh::new(name, vertices, triangles)?)
 }
 
 #[cfg(test)]
