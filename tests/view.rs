@@ -256,6 +256,62 @@ fn what_one_position_too_low_leaves_is_seen_on_the_map() {
 }
 
 #[test]
+fn a_part_alone_is_shown_with_its_open_edges() {
+    let Some(browser) = Browser::start(&WITH_WEBGL) else {
+        return;
+    };
+    let dir = scratch();
+    let corners = "v 0 0 0\nv 60 0 0\nv 0 80 0\nv 0 0 90\n";
+    let faces = "f 1 3 2\nf 1 2 4\nf 2 3 4\n";
+    let open_mesh = dir.path().join("open.obj");
+    std::fs::write(&open_mesh, format!("{corners}{faces}")).expect("written");
+    let last = sample().with_file_name("last.step");
+    let page = dir.path().join("part.html");
+    let said = succeed(&[
+        "inspect",
+        text(&last),
+        text(&open_mesh),
+        "--html",
+        text(&page),
+    ]);
+    assert!(
+        said.ends_with(&format!("wrote {}\n", page.display())),
+        "{said}"
+    );
+    open(&browser, &page);
+
+    let first = browser.ask("return picture()");
+    let covered = number(&first["covered"]);
+    assert!((0.03..0.7).contains(&covered), "{first}");
+    let bare = browser.ask("document.querySelector('#show-edges').click(); return picture()");
+    assert_ne!(bare["sum"], first["sum"], "three edges are marked");
+    browser.ask("document.querySelector('#show-part').click()");
+    let nothing = browser.ask("return picture()");
+    assert_eq!(nothing["covered"], json!(0), "{nothing}");
+    browser.ask("document.querySelector('#show-part').click(); document.querySelector('#show-edges').click()");
+
+    let visible = browser.ask(
+        "return ['#scene', '#figures', '#legend', '#unrolled', '#errors', '#motion', '#here', '#play', '#show-wheel']
+            .filter((id) => document.querySelector(id).checkVisibility())",
+    );
+    assert_eq!(visible, json!(["#scene", "#figures", "#legend"]));
+    let told = browser.ask("return document.body.innerText");
+    let told = told.as_str().expect("text");
+    for words in [
+        "4 bodies · 3 open edges",
+        "last.step",
+        "open.obj",
+        "no unit stated, taken as mm",
+        "60.00 × 80.00 × 90.00 mm",
+    ] {
+        assert!(told.contains(words), "{words:?} is missing: {told}");
+    }
+    assert_eq!(browser.ask("return window.shifts"), json!([]));
+    check_looks(&browser, "part");
+    assert_eq!(browser.complaints(), Vec::<Value>::new());
+}
+
+#[test]
 fn fingers_turn_and_zoom_and_play_goes_along_the_path() {
     let Some(browser) = Browser::start(&WITH_WEBGL) else {
         return;
@@ -353,7 +409,7 @@ fn check_looks(browser: &Browser, what: &str) {
     }
     browser.screen(1280, 900, "light");
     let nameless = "return [...document.querySelectorAll('button, input, select, section, table, canvas, a, [role]')]
-        .filter((e) => !(e.ariaLabel || e.ariaHidden || e.textContent.trim() || e.labels?.length
+        .filter((e) => e.checkVisibility() && !(e.ariaLabel || e.ariaHidden || e.textContent.trim() || e.labels?.length
             || e.getAttribute('aria-labelledby')))
         .map((e) => e.outerHTML)";
     assert_eq!(browser.ask(nameless), json!([]));

@@ -154,6 +154,10 @@ Exit codes: 0 no check failed, 2 something here is wrong, 4 master and worker do
         /// In a job: units in its section part
         #[arg(long, value_name = "UNIT", value_parser = unit)]
         units: Option<Unit>,
+        /// Also write a page that shows all of them in three dimensions, open edges marked; it works from
+        /// disk, in any browser
+        #[arg(long, value_name = "PAGE")]
+        html: Option<PathBuf>,
     },
     /// Measure on this machine what the searches cost, and what clusters gain
     #[command(subcommand)]

@@ -3,15 +3,23 @@
 use std::path::{Path, PathBuf};
 
 use horma_formats::part::Unit;
-use horma_formats::{inspect, sample};
+use horma_formats::{inspect, sample, view};
 
 use crate::error::Result;
 use crate::say;
 
-/// Tells what is in each file.
-pub(crate) fn inspect(files: &[PathBuf], units: Option<&Unit>) -> Result<()> {
+/// Tells what is in each file, and shows all of them on the page `html`.
+pub(crate) fn inspect(files: &[PathBuf], units: Option<&Unit>, html: Option<&Path>) -> Result<()> {
+    let mut all = Vec::new();
     for file in files {
-        say(&inspect::inspect(file, units.cloned())?.to_string());
+        let (inspection, part) = inspect::inspect(file, units.cloned())?;
+        say(&inspection.to_string());
+        all.push((inspection, part));
+    }
+    if let Some(page) = html {
+        let (seen, figures) = view::part(&all);
+        view::save(page, &seen, &figures)?;
+        say(&format!("wrote {}", page.display()));
     }
     Ok(())
 }

@@ -117,7 +117,9 @@ fn execute(arguments: Arguments) -> Result<()> {
         Command::Doctor(args) => doctor::doctor(&args),
         Command::Certs(certs) => certs::certs(&certs),
         Command::Init { directory } => inspect::init(&directory),
-        Command::Inspect { files, units } => inspect::inspect(&files, units.as_ref()),
+        Command::Inspect { files, units, html } => {
+            inspect::inspect(&files, units.as_ref(), html.as_deref())
+        }
         Command::Bench(args::Bench::Kernel(bench)) => bench::kernel(&bench),
         Command::Bench(args::Bench::Scaling(bench)) => bench::scaling(&bench),
         Command::Papers(args) => papers::papers(&args),

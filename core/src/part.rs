@@ -140,9 +140,9 @@ impl Mesh {
         &self.triangles
     }
 
-    /// Edges that do not lie between exactly two triangles, vertices at the same place being one;
-    /// 0 means that the mesh is watertight. Degenerate triangles are passed over.
-    pub fn open_edges(&self) -> usize {
+    /// Edges that do not lie between exactly two triangles, by their vertices, vertices at the same place
+    /// being one; none means that the mesh is watertight. Degenerate triangles are passed over.
+    pub fn open_edges(&self) -> Vec<[u32; 2]> {
         let mut places = HashMap::with_capacity(self.vertices.len());
         let welded: Vec<u32> = (0u32..)
             .zip(&self.vertices)
@@ -159,7 +159,10 @@ impl Mesh {
                 *faces.entry((p.min(q), p.max(q))).or_insert(0) += 1;
             }
         }
-        faces.values().filter(|&&n| n != 2).count()
+        let open = faces.into_iter().filter(|&(_, n)| n != 2);
+        let mut open: Vec<[u32; 2]> = open.map(|((p, q), _)| [p, q]).collect();
+        open.sort_unstable();
+        open
     }
 
     /// The same with every triangle turned round.
@@ -220,9 +223,9 @@ mod tests {
     fn open_edges_are_counted() {
         let (v, t) = tetrahedron();
         let closed = Mesh::new("t", v.clone(), t.clone()).expect("valid");
-        assert_eq!(closed.open_edges(), 0);
+        assert_eq!(closed.open_edges().len(), 0);
         let open = Mesh::new("t", v, t[1..].to_vec()).expect("valid");
-        assert_eq!(open.open_edges(), 3);
+        assert_eq!(open.open_edges().len(), 3);
     }
 
     #[test]

@@ -74,11 +74,12 @@ pub enum Kind {
     },
 }
 
-/// Reads the file at `path` and describes it; `unit` is that of its lengths if it states none.
+/// Reads the file at `path` and describes it; `unit` is that of its lengths if it states none. Gives the part
+/// too, where it is in the file.
 ///
 /// # Errors
 /// Those of [`part::read`].
-pub fn inspect(path: &Path, unit: Option<Unit>) -> Result<Inspection> {
+pub fn inspect(path: &Path, unit: Option<Unit>) -> Result<(Inspection, Part)> {
     // What a trim cuts away can be looked at all the same.
     let trimmed = Trimmed::Whole;
     let loaded = part::read(path, &Reading { unit, trimmed })?;
@@ -100,13 +101,14 @@ pub fn inspect(path: &Path, unit: Option<Unit>) -> Result<Inspection> {
             high,
         }
     });
-    Ok(Inspection {
+    let inspection = Inspection {
         file: name.to_string_lossy().into_owned(),
         unit: loaded.unit,
         stated: loaded.stated,
         bodies: bodies.collect(),
         warnings: loaded.warnings,
-    })
+    };
+    Ok((inspection, part))
 }
 
 fn describe_surface(surface: &Surface) -> (Kind, Vec<Point>) {
@@ -142,7 +144,7 @@ fn is_closed(surface: &Surface, vs: &[f64]) -> bool {
 }
 
 fn describe_mesh(mesh: &Mesh) -> (Kind, Vec<Point>) {
-    let open_edges = mesh.open_edges();
+    let open_edges = mesh.open_edges().len();
     let kind = Kind::Mesh {
         triangles: mesh.triangles().len(),
         vertices: mesh.vertices().len(),
@@ -208,25 +210,31 @@ impl fmt::Display for Kind {
     }
 }
 
+impl Inspection {
+    /// The unit of its lengths, and whether it says so.
+    pub fn unit(&self) -> String {
+        let Unit { name, millimetres } = &self.unit;
+        match self.stated {
+            true => name.clone(),
+            false if *millimetres == 1.0 => "no unit stated, taken as mm".to_owned(),
+            false => format!("no unit stated, taken as {name}"),
+        }
+    }
+
+    /// Name, kind, size and least corner of each body, in words.
+    pub fn rows(&self) -> Vec<[String; 4]> {
+        let prefix = format!("{}: ", self.file);
+        self.bodies.iter().map(|b| row(b, &prefix)).collect()
+    }
+}
+
 /// A line for the file, one for each body, in columns, and one for each warning.
 impl fmt::Display for Inspection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let count = self.bodies.len();
         let bodies = if count == 1 { "body" } else { "bodies" };
-        let Unit { name, millimetres } = &self.unit;
-        let name = if *millimetres == 1.0 && !self.stated {
-            "mm"
-        } else {
-            name
-        };
-        let taken = if self.stated {
-            ""
-        } else {
-            "no unit stated, taken as "
-        };
-        write!(f, "{}: {count} {bodies}, {taken}{name}", self.file)?;
-        let prefix = format!("{}: ", self.file);
-        let rows: Vec<[String; 4]> = self.bodies.iter().map(|b| row(b, &prefix)).collect();
+        write!(f, "{}: {count} {bodies}, {}", self.file, self.unit())?;
+        let rows = self.rows();
         let width = |i: usize| rows.iter().map(|r| r[i].chars().count()).max().unwrap_or(0);
         let widths = [width(0), width(1), width(2)];
         for [name, kind, size, from] in &rows {
@@ -262,7 +270,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join(file);
         std::fs::write(&path, content).expect("written");
-        inspect(&path, None).expect("valid").to_string()
+        inspect(&path, None).expect("valid").0.to_string()
     }
 
     #[test]

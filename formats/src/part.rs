@@ -272,7 +272,7 @@ fn check_mesh(name: &str, mesh: &Mesh) -> Vec<Warning> {
         length(cross(sub(b, a), sub(c, a))) == 0.0
     };
     let facets = mesh.triangles().iter().filter(has_no_area).count();
-    let edges = mesh.open_edges();
+    let edges = mesh.open_edges().len();
     let name = || name.to_owned();
     let degenerate = (facets > 0).then(|| Warning::DegenerateFacets {
         name: name(),

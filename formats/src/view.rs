@@ -1,9 +1,11 @@
-//! `report.html`: a run to look at. One file that works from disk and asks the network for nothing.
+//! `report.html`: a run to look at, or a part alone. One file that works from disk and asks the network for
+//! nothing.
 //!
-//! [`view()`] makes plain data of what was computed, thinned until a browser can hold it; [`save`]
-//! writes the page around it. What is drawn, and how, is for the page alone; nothing is computed here
+//! [`view()`] and [`part()`] make plain data of what was computed, thinned until a browser can hold it;
+//! [`save`] writes the page around it. What is drawn, and how, is for the page alone; nothing is computed here
 //! that decides anything about a path.
 
+mod alone;
 mod errors;
 mod pack;
 mod solid;
@@ -19,8 +21,8 @@ use serde::Serialize;
 use crate::error::Result;
 use crate::output;
 use crate::preview::Sheet;
-use crate::report::Report;
 
+pub use alone::{PartFigures, part};
 pub use errors::Errors;
 pub use solid::Solid;
 pub use thin::{Seen, Shown};
@@ -34,11 +36,11 @@ const PROFILE: usize = 32;
 pub struct View {
     /// How positions follow each other; nothing if each has a place of its own.
     pub motion: Option<Motion>,
-    /// The wheel's profile: axial distance from its centre and radius there, mm.
+    /// The wheel's profile: axial distance from its centre and radius there, mm; empty for a part alone.
     pub wheel: Vec<[f64; 2]>,
     /// The part as triangles.
     pub part: Solid,
-    /// The path.
+    /// The path; no position for a part alone.
     pub path: Shown,
     /// How far from the designed surface the path stays; nothing if that was not looked at.
     pub errors: Option<Errors>,
@@ -112,6 +114,8 @@ fn profile(cutter: &Cutter) -> Vec<[f64; 2]> {
 struct Contents<'a> {
     motion: Option<&'a Motion>,
     wheel: &'a [[f64; 2]],
+    /// The first point of each body.
+    bodies: &'a [u32],
     triangles: Count,
     positions: Count,
     /// Of how many positions that follow each other the outstanding ones are shown.
@@ -147,15 +151,16 @@ const SCRIPTS: [&str; 7] = [
     include_str!("view/page/page.js"),
 ];
 
-/// Writes the page that shows `view` and the figures of `report`: beside it first, then renamed.
+/// Writes the page that shows `view` and the figures of `report`, a [`crate::report::Report`] or
+/// [`PartFigures`]: beside it first, then renamed.
 ///
 /// # Errors
 /// [`crate::Error::Io`], naming `file`.
-pub fn save(file: &Path, view: &View, report: &Report) -> Result<()> {
+pub fn save(file: &Path, view: &View, report: &impl Serialize) -> Result<()> {
     output::write(file, |out| write(out, view, report))
 }
 
-fn write(out: &mut impl Write, view: &View, report: &Report) -> io::Result<()> {
+fn write(out: &mut impl Write, view: &View, report: &impl Serialize) -> io::Result<()> {
     let mut rest = HTML;
     let mut until = |out: &mut dyn Write, mark: &str| -> io::Result<()> {
         let (before, after) = rest.split_once(mark).expect("the page has its marks");
@@ -174,7 +179,7 @@ fn write(out: &mut impl Write, view: &View, report: &Report) -> io::Result<()> {
 }
 
 /// Every number of the page, each kind in an element of its own.
-fn numbers(out: &mut impl Write, view: &View, report: &Report) -> io::Result<()> {
+fn numbers(out: &mut impl Write, view: &View, report: &impl Serialize) -> io::Result<()> {
     let View {
         part,
         path,
@@ -192,6 +197,7 @@ fn numbers(out: &mut impl Write, view: &View, report: &Report) -> io::Result<()>
     let contents = Contents {
         motion: view.motion.as_ref(),
         wheel: &view.wheel,
+        bodies: &part.bodies,
         triangles: Count {
             shown: part.triangles.len() as u64,
             of: part.of,
@@ -220,6 +226,11 @@ fn numbers(out: &mut impl Write, view: &View, report: &Report) -> io::Result<()>
     pack::block(out, "vertices", part.points.iter().map(|&p| place(p)))?;
     let corners = part.triangles.iter().flatten();
     pack::block(out, "triangles", corners.map(|c| c.to_le_bytes()))?;
+    let edges = part.edges.iter().flatten();
+    pack::block(out, "edges", edges.map(|&p| place(p)))?;
+    if path.positions.is_empty() {
+        return Ok(());
+    }
     let index = |i: Index| (i.floor() as f64 + i.share()).to_le_bytes();
     pack::block(out, "index", seen().map(|p| index(p.index)))?;
     if view.motion.is_none() {

@@ -282,7 +282,7 @@ mod tests {
     fn equal_vertices_are_welded() {
         let b = mesh(&binary(b"", 2, &[FACET_A, FACET_B]));
         assert_eq!((b.vertices().len(), b.triangles().len()), (4, 2));
-        assert_eq!(b.open_edges(), 4);
+        assert_eq!(b.open_edges().len(), 4);
     }
 
     #[test]

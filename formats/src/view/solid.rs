@@ -20,6 +20,10 @@ pub struct Solid {
     pub points: Vec<Point>,
     /// Triangles by their corners.
     pub triangles: Vec<[u32; 3]>,
+    /// The first point of each body; its points follow each other.
+    pub bodies: Vec<u32>,
+    /// Edges to be marked, those that are open.
+    pub edges: Vec<[Point; 2]>,
     /// How many triangles there were before they became fewer.
     pub of: u64,
 }
@@ -53,6 +57,7 @@ fn joined(sheets: &[Sheet], of: usize) -> Solid {
     };
     for sheet in sheets {
         let first = solid.points.len() as u32;
+        solid.bodies.push(first);
         solid.points.extend(&sheet.points);
         let triangles = sheet.triangles.iter().map(|t| t.map(|c| first + c));
         solid.triangles.extend(triangles);

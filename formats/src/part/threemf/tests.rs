@@ -75,7 +75,7 @@ fn what_is_built_is_read_where_it_is_put() {
         (name.as_str(), mesh.triangles().len()),
         ("t.3mf: object 1", 4)
     );
-    assert_eq!(mesh.open_edges(), 0);
+    assert_eq!(mesh.open_edges().len(), 0);
     // The second puts the first twice, once moved and once mirrored; what is not built does not count.
     let pair = r#"<object id="2" name="pair"><components><component objectid="1"
         transform="1 0 0 0 1 0 0 0 1 10 0 0"/><component objectid="1"

@@ -39,6 +39,7 @@ function scale(values, unit, signed, share) {
 
 const rim = path.travels.map((x, i) => (Number.isNaN(path.heights[i]) ? NaN : path.contacts[3 * i] - x));
 
+/// Each has colours on a scale, or its own for each of some names.
 const choices = [];
 
 /// A choice of colours for deviations from the designed surface. What is cut as it should be fills the colours;
@@ -59,7 +60,7 @@ if (machined) {
   const { deepest_gouge: deepest, percentiles } = report.machined;
   deviations("machined", "the surface as machined", "rays", machined.deviations, -(deepest?.deviation ?? 0), percentiles?.median ?? 0);
 }
-choices.push(
+if (!alone) choices.push(
   { id: "height", name: "tool centre", values: path.heights, on: "path", scale: scale(path.heights, "mm", false) },
   { id: "speed", name: "speed of the attack axis", values: path.slopes, on: "path",
     scale: scale(path.slopes, "mm/°", true, 0.998), ends: ["towards the part", "away from it"] },
@@ -69,12 +70,17 @@ choices.push(
     ends: ["behind", "ahead"] },
 );
 if (path.extents) {
-  choices.push({ id: "extent", name: "extent and worker", values: path.extents, on: "path", scale: null });
+  const colour = (extent) => distinct(workers.indexOf(extents[extent].worker)).map((c) => c * (extent % 2 ? 0.8 : 1));
+  choices.push({ id: "extent", name: "extent and worker", values: path.extents, on: "path", colour, names: workers });
+}
+if (alone) {
+  const names = report.bodies.map(({ name }) => name);
+  choices.push({ id: "bodies", name: "bodies of the part", values: part.bodies, on: "part", colour: distinct, names });
 }
 
 /// Red, green and blue of a value of a choice.
 function colourOf(choice, value) {
-  if (!choice.scale) return distinct(workers.indexOf(extents[value].worker)).map((c) => c * (value % 2 ? 0.8 : 1));
+  if (choice.colour) return choice.colour(value);
   const { low, high, ramp } = choice.scale;
   return blend(ramp, high > low ? (value - low) / (high - low) : 0.5);
 }

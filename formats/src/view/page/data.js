@@ -4,6 +4,8 @@ const $ = (selector, within = document) => within.querySelector(selector);
 
 const contents = JSON.parse($("#contents").textContent);
 const report = JSON.parse($("#report").textContent);
+/// A part alone has no path, and figures of its own.
+const alone = !report.path;
 
 /// The numbers of an element, which is emptied: nobody needs them twice.
 function unpack(id, kind) {
@@ -29,7 +31,10 @@ function points(id) {
   return all;
 }
 
-const part = { points: points("vertices"), triangles: unpack("triangles", Uint32Array) };
+const part = { points: points("vertices"), triangles: unpack("triangles", Uint32Array), edges: points("edges") };
+/// The body of each point.
+part.bodies = new Uint16Array(part.points.length / 3);
+contents.bodies.forEach((first, body) => part.bodies.fill(body, first));
 const surface = { points: points("samples"), clearances: unpack("clearances", Float32Array) };
 
 /// The machined surface in cells of travel and angle: how far the designed one is from the spindle, and how far
@@ -42,11 +47,11 @@ const machined = contents.cells && {
 
 /// The path: a number of each kind for each position that is shown.
 const path = {
-  index: unpack("index", Float64Array),
-  heights: unpack("heights", Float32Array),
-  contacts: points("contacts"),
-  slopes: unpack("slopes", Float32Array),
-  bends: unpack("bends", Float32Array),
+  index: unpack("index", Float64Array) ?? new Float64Array(),
+  heights: unpack("heights", Float32Array) ?? new Float32Array(),
+  contacts: points("contacts") ?? new Float32Array(),
+  slopes: unpack("slopes", Float32Array) ?? new Float32Array(),
+  bends: unpack("bends", Float32Array) ?? new Float32Array(),
 };
 path.length = path.index.length;
 // Positions from elsewhere have places of their own.
@@ -62,7 +67,7 @@ function travel(index) {
 }
 
 /// The extent of each position, and who digitized it.
-const extents = report.extents;
+const extents = report.extents ?? [];
 const workers = [...new Set(extents.map((e) => e.worker))];
 path.extents = extents.length ? path.index.map((i) => extentOf(i)) : null;
 

@@ -1,5 +1,7 @@
 // The page: one state, drawn whole whenever it has changed.
 
+const shown = ["part", "edges", "contacts", "centres", "wheel"];
+
 const state = {
   position: firstTouch(),
   choice: choices[0],
@@ -16,6 +18,8 @@ function firstTouch() {
 }
 
 // Shown all at once, so that nothing moves while the numbers come.
+for (const element of document.querySelectorAll(alone ? ".of-path" : ".of-part")) element.hidden = true;
+$("main").classList.toggle("alone", alone);
 $("main").hidden = false;
 
 const canvas = $("#solid");
@@ -36,7 +40,7 @@ function theme() {
     return getComputedStyle(probe).color;
   };
   const rgb = (name) => text(name).match(/\d+/g).slice(0, 3).map(Number);
-  const [plots, solids] = [["text", "faint", "edge", "accent", "bad"], ["part", "wheel", "line", "mark"]];
+  const [plots, solids] = [["text", "faint", "edge", "accent", "bad"], ["part", "wheel", "line", "mark", "open"]];
   const found = Object.fromEntries([...plots.map((n) => [n, text(n)]), ...solids.map((n) => [n, rgb(n)])]);
   probe.remove();
   return found;
@@ -54,13 +58,14 @@ function redraw() {
 function draw() {
   due = 0;
   const { position, choice } = state;
-  const show = Object.fromEntries(["part", "contacts", "centres", "wheel"].map((n) => [n, $(`#show-${n}`).checked]));
+  const show = Object.fromEntries(shown.map((n) => [n, $(`#show-${n}`).checked]));
   picture?.draw({ position, choice, show, theme: scheme });
+  drawLegend(choice);
+  if (alone) return;
   if (map?.choice !== choice) map = { ...mapPicture(choice), choice };
   drawMap($("#map"), map, position, scheme);
   drawAxis($("#axis"), { ...state, theme: scheme });
   if (surface.clearances?.length) drawHistogram($("#histogram"), choices[0], scheme);
-  drawLegend(choice);
   tell(position);
 }
 
@@ -70,12 +75,13 @@ function drawLegend(choice) {
   const captions = $("figcaption", figure);
   fit(bar);
   const pen = bar.getContext("2d");
-  if (!choice.scale) {
-    workers.forEach((_, i) => {
+  const { names } = choice;
+  if (names) {
+    names.forEach((_, i) => {
       pen.fillStyle = `rgb(${distinct(i)})`;
-      pen.fillRect((bar.width * i) / workers.length, 0, bar.width / workers.length, bar.height);
+      pen.fillRect((bar.width * i) / names.length, 0, bar.width / names.length, bar.height);
     });
-    captions.replaceChildren(...workers.map((name) => make("span", "", name)));
+    captions.replaceChildren(...names.map((name) => make("span", "", name)));
     return;
   }
   const { low, high, unit, beyond } = choice.scale;
@@ -119,6 +125,10 @@ function tell(i) {
 /// Says what each drawing shows, for those who do not see it.
 function describe() {
   const { choice } = state;
+  if (alone) {
+    canvas.ariaLabel = `The part, a colour for each of its bodies: ${choice.names.join(", ")}`;
+    return;
+  }
   const where = choice.scale ? `, from ${rough(choice.scale.low)} to ${rough(choice.scale.high)} ${choice.scale.unit}` : "";
   canvas.ariaLabel = `The part on the lathe with its tool path and the wheel, coloured by ${choice.name}${where}`;
   $("#map").ariaLabel = `Unrolled map over travel and angle, coloured by ${choice.name}${where}`;
@@ -155,11 +165,18 @@ function shownNote() {
   const cells = machined && machined.rows * machined.columns;
   const strayed = machined && cells < machined.rays ? ", of those beside each other the one that strays most" : "";
   const met = machined ? `; ${of({ shown: cells, of: machined.rays })} rays that end at the machined surface${strayed}` : "";
+  if (alone) return `Shown are ${of(triangles)} triangles, where the files have them. Lengths are in mm.`;
   return `Shown are ${of(positions)} positions${rule}; ${of(triangles)} triangles of the part${sampled}${met}. Lengths are in mm. ` +
     "Figures and the histogram count everything.";
 }
 
 function summary() {
+  if (alone) {
+    const { files, bodies, open_edges: open } = report;
+    const several = (n, one, many) => `${count.format(n)} ${n === 1 ? one : many}`;
+    return [files.map(({ name }) => name).join(", "), several(bodies.length, "body", "bodies"),
+      open ? several(open, "open edge", "open edges") : "no open edge"].join(" · ");
+  }
   const { cutter, motion } = report.job ?? {};
   const positions = `${count.format(report.path.positions)} positions`;
   const gouge = report.verification?.normal.gouge;
@@ -208,13 +225,13 @@ $("#colour").addEventListener("change", ({ target }) => {
   describe();
   redraw();
 });
-for (const name of ["part", "contacts", "centres", "wheel"]) $(`#show-${name}`).addEventListener("change", redraw);
+for (const name of shown) $(`#show-${name}`).addEventListener("change", redraw);
 $("#home").addEventListener("click", () => {
   picture?.home();
   redraw();
 });
 const slider = $("#at");
-slider.max = path.length - 1;
+slider.max = Math.max(path.length - 1, 0);
 slider.addEventListener("input", () => {
   if (state.playing) toggle();
   go(Number(slider.value));
@@ -252,10 +269,10 @@ if (surface.clearances?.length) {
 } else {
   $("#errors").hidden = true;
 }
-document.title = `horma · ${report.path.positions} positions`;
+document.title = alone ? `horma · ${report.files.map(({ name }) => name).join(", ")}` : `horma · ${report.path.positions} positions`;
 $("#summary").textContent = summary();
 $("#shown").textContent = shownNote();
-$("#tables").append(...tables());
+$("#tables").append(...(alone ? partTables(report) : tables()));
 describe();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   scheme = theme();

@@ -32,7 +32,7 @@ function words(pen, text, x, y, align = "left", baseline = "alphabetic") {
 // The unrolled map.
 
 /// Step and points per revolution: the path's, or those of the job that it is held against.
-const motion = contents.motion ?? report.job.motion;
+const motion = contents.motion ?? report.job?.motion;
 
 const MAP = { left: 46, right: 12, top: 10, bottom: 36 };
 

@@ -55,9 +55,10 @@ function scene(canvas) {
     ["turn", "shift", "view", "centre", "zoom", "lift", "size", "paint", "lit"].map((n) => [n, uniform(n)]),
   );
   const solid = solidBuffers(gl, part);
-  const tool = solidBuffers(gl, wheel(contents.wheel));
+  const edges = part.edges.length && figure(gl, gl.LINES, part.edges, Uint32Array.from(part.edges, (_, i) => i).subarray(0, part.edges.length / 3));
+  const tool = !alone && solidBuffers(gl, wheel(contents.wheel));
   const order = strip();
-  const lines = { contacts: lineBuffers(gl, path.contacts, order), centres: lineBuffers(gl, centres(), order) };
+  const lines = alone ? {} : { contacts: lineBuffers(gl, path.contacts, order), centres: lineBuffers(gl, centres(), order) };
   const samples = surface.points && cloud(gl, surface);
   const left = machined && shellBuffers(gl, shell(machined));
   let coloured = null;
@@ -70,6 +71,7 @@ function scene(canvas) {
     const all = colours(choice);
     if (choice.on === "surface") samples.colour(all);
     else if (choice.on === "rays") left.colour(all);
+    else if (choice.on === "part") solid.colour(all);
     else for (const line of Object.values(lines)) line.colour(all);
   }
 
@@ -91,7 +93,7 @@ function scene(canvas) {
     gl.uniformMatrix3fv(at.view, false, [...right, ...up, ...out]);
     gl.uniform3fv(at.centre, centre);
     gl.uniform3f(at.zoom, (2 * scale) / width, (2 * scale) / height, 1 / box.deep);
-    const angle = around(path.angles[position]) * (Math.PI / 180);
+    const angle = alone ? 0 : around(path.angles[position]) * (Math.PI / 180);
     const turned = [Math.cos(angle), Math.sin(angle)];
     gl.uniform2fv(at.turn, turned);
     gl.uniform3f(at.shift, 0, 0, 0);
@@ -103,10 +105,11 @@ function scene(canvas) {
       gl.uniform1f(at.size, size);
     };
     colourBy(choice);
-    const errors = choice.on !== "path";
+    const errors = ["surface", "rays"].includes(choice.on);
     if (show.part) {
       set(true, 0);
-      paint(errors ? [226, 222, 216] : theme.part);
+      if (choice.on === "part") ownColours();
+      else paint(errors ? [226, 222, 216] : theme.part);
       solid.draw();
       if (errors) {
         // Errors tint what is lit below them, each place once; of samples the worst first.
@@ -131,6 +134,15 @@ function scene(canvas) {
       else ownColours();
       line.draw();
     }
+    if (edges && show.edges) {
+      // Through the part, so that none is missed.
+      gl.disable(gl.DEPTH_TEST);
+      set(false, 0);
+      paint(theme.open);
+      edges.draw();
+      gl.enable(gl.DEPTH_TEST);
+    }
+    if (alone) return;
     const reached = path.heights[position];
     const touching = !Number.isNaN(reached);
     if (touching) {
@@ -166,6 +178,7 @@ function fit(canvas) {
 
 /// The middle of what is shown, and how wide, high and deep the picture has to be for it.
 function extent() {
+  if (alone) return boxed(part.points);
   const axis = (k) => part.points.filter((_, i) => i % 3 === k);
   const [from, to] = range([...range(path.travels), ...range(axis(0))]);
   const [y, z] = [axis(1), axis(2)];
@@ -180,6 +193,13 @@ function extent() {
     deep: 2 * (to - from + reach + rim),
     top: reach + 20,
   };
+}
+
+/// The same for points that may lie anywhere.
+function boxed(points) {
+  const sides = [0, 1, 2].map((k) => range(points.filter((_, i) => i % 3 === k)));
+  const across = Math.max(Math.hypot(...sides.map(([low, high]) => high - low)), 1e-6);
+  return { centre: sides.map(([low, high]) => (low + high) / 2), wide: 1.05 * across, high: 0.8 * across, deep: 2 * across };
 }
 
 function link(gl) {
@@ -210,17 +230,10 @@ function indices(gl, data) {
 }
 
 function solidBuffers(gl, { points, triangles }) {
-  const array = gl.createVertexArray();
-  gl.bindVertexArray(array);
-  attribute(gl, 0, points, 3, gl.FLOAT);
+  const solid = figure(gl, gl.TRIANGLES, points, triangles);
+  gl.bindVertexArray(solid.array);
   attribute(gl, 1, normals(points, triangles), 3, gl.FLOAT);
-  indices(gl, triangles);
-  return {
-    draw() {
-      gl.bindVertexArray(array);
-      gl.drawElements(gl.TRIANGLES, triangles.length, gl.UNSIGNED_INT, 0);
-    },
-  };
+  return solid;
 }
 
 /// Points with a colour each, which can be given anew.

@@ -152,6 +152,14 @@ function flat(value, name = "") {
 
 const spaced = (key) => key.replaceAll("_", " ");
 
+/// The tables of a part alone.
+function partTables({ version, files, bodies, warnings }) {
+  const all = [table("Bodies", ["body", "kind", "size", "least corner"], bodies.map((b) => [b.name, b.kind, b.size, b.from]), "broad"),
+    table("Files", ["file", "unit"], files.map((f) => [f.name, f.unit]), "broad")];
+  if (warnings.length) all.unshift(table("Warnings", [], warnings.map((w) => [w])));
+  return [...all, table("Made by", [], [["horma", version]])];
+}
+
 /// All tables, what matters most first; the narrow ones are in columns.
 function tables() {
   const { version, job, warnings, path: figures, verification, machined: left, phases, bodies, extents, lost, second, counters, traffic, window, workers, extents_from_journal, program, ...others } = report;
