@@ -18,6 +18,8 @@ pub mod precision;
 
 pub mod coprocessor;
 
+pub mod searches;
+
 pub mod report;
 
 pub mod html;
@@ -69,15 +71,18 @@ pub enum Experiment {
     Precision,
     /// Packed points, the transform unit, how it speeds up a path.
     Coprocessor,
+    /// The experiments of 2001: windows, gouges over points, workers.
+    Searches,
 }
 
 impl Experiment {
     /// All of them, in the order in which they are told.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 5] = [
         Self::MultiRotator,
         Self::Cordic,
         Self::Precision,
         Self::Coprocessor,
+        Self::Searches,
     ];
 
     /// What it is called on the command line.
@@ -87,6 +92,7 @@ impl Experiment {
             Self::Cordic => "cordic",
             Self::Precision => "precision",
             Self::Coprocessor => "coprocessor",
+            Self::Searches => "searches",
         }
     }
 
@@ -100,6 +106,7 @@ impl Experiment {
             Self::Cordic => cordic::chapter(),
             Self::Precision => precision::chapter(),
             Self::Coprocessor => coprocessor::chapter(),
+            Self::Searches => searches::chapter(),
         }
     }
 }
