@@ -20,6 +20,8 @@ pub mod coprocessor;
 
 pub mod searches;
 
+pub mod quality;
+
 pub mod report;
 
 pub mod html;
@@ -73,16 +75,19 @@ pub enum Experiment {
     Coprocessor,
     /// The experiments of 2001: windows, gouges over points, workers.
     Searches,
+    /// What lasts measure as designed and as machined.
+    Quality,
 }
 
 impl Experiment {
     /// All of them, in the order in which they are told.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::MultiRotator,
         Self::Cordic,
         Self::Precision,
         Self::Coprocessor,
         Self::Searches,
+        Self::Quality,
     ];
 
     /// What it is called on the command line.
@@ -93,6 +98,7 @@ impl Experiment {
             Self::Precision => "precision",
             Self::Coprocessor => "coprocessor",
             Self::Searches => "searches",
+            Self::Quality => "quality",
         }
     }
 
@@ -107,6 +113,7 @@ impl Experiment {
             Self::Precision => precision::chapter(),
             Self::Coprocessor => coprocessor::chapter(),
             Self::Searches => searches::chapter(),
+            Self::Quality => quality::chapter(),
         }
     }
 }
