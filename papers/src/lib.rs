@@ -18,6 +18,10 @@ pub mod precision;
 
 pub mod coprocessor;
 
+pub mod searches;
+
+pub mod quality;
+
 pub mod report;
 
 pub mod html;
@@ -69,15 +73,21 @@ pub enum Experiment {
     Precision,
     /// Packed points, the transform unit, how it speeds up a path.
     Coprocessor,
+    /// The experiments of 2001: windows, gouges over points, workers.
+    Searches,
+    /// What lasts measure as designed and as machined.
+    Quality,
 }
 
 impl Experiment {
     /// All of them, in the order in which they are told.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 6] = [
         Self::MultiRotator,
         Self::Cordic,
         Self::Precision,
         Self::Coprocessor,
+        Self::Searches,
+        Self::Quality,
     ];
 
     /// What it is called on the command line.
@@ -87,6 +97,8 @@ impl Experiment {
             Self::Cordic => "cordic",
             Self::Precision => "precision",
             Self::Coprocessor => "coprocessor",
+            Self::Searches => "searches",
+            Self::Quality => "quality",
         }
     }
 
@@ -100,6 +112,8 @@ impl Experiment {
             Self::Cordic => cordic::chapter(),
             Self::Precision => precision::chapter(),
             Self::Coprocessor => coprocessor::chapter(),
+            Self::Searches => searches::chapter(),
+            Self::Quality => quality::chapter(),
         }
     }
 }
