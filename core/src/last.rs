@@ -135,6 +135,16 @@ pub fn shape(
     let base = last.skin(part)?;
     let found = landmarks::find(&base, &last.frame, &last.choices)?;
     let measures = measures::measure(&base, &last.frame, &found, base.along())?;
+    if size.is_none() && !mirrored {
+        let Interval { low, high } = last.ends(base.along());
+        return Ok(Shaped {
+            part: part.clone(),
+            landmarks: found,
+            measures,
+            scale: grade::Grade::none().scale,
+            ends: [(low, low), (high, high)],
+        });
+    }
     let mut correction = 0.0;
     let mut rounds = 0..ROUNDS;
     loop {
