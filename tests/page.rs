@@ -137,7 +137,7 @@ fn check_looks(browser: &Browser, when: &str) {
             browser.screen(width, height, scheme);
             let wide = browser.ask("return document.documentElement.scrollWidth");
             assert_eq!(wide, json!(width), "{when}, {scheme}");
-            let file = format!("page-{when}-{width}-{scheme}.png.base64");
+            let file = format!("page-{when}-{width}-{scheme}.png");
             let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(file);
             std::fs::write(file, browser.picture()).expect("writable");
         }

@@ -394,6 +394,38 @@ fn without_webgl_the_plots_and_figures_are_there() {
     assert_eq!(browser.complaints(), Vec::<Value>::new());
 }
 
+#[test]
+#[ignore = "makes the pictures and figures of docs/report.md anew: -- --ignored --nocapture"]
+fn pictures_for_the_documentation() {
+    let Some(browser) = Browser::start(&WITH_WEBGL) else {
+        return;
+    };
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/report");
+    let part = sample().with_file_name("last.step");
+    for (name, step, turn) in [("44k", 2.0, 248), ("million", 0.5, 1440)] {
+        let dir = scratch();
+        let more = format!(
+            "[cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0\n\
+             [motion]\nstep = {step:?}\npoints_per_revolution = {turn}\n"
+        );
+        let page = page(dir.path(), &job(dir.path(), "job.toml", &[&part], &more));
+        let bytes = std::fs::metadata(&page).expect("written").len();
+        for (width, height) in [(1280, 900), (390, 844)] {
+            browser.screen(width, height, "light");
+            browser.open(&format!("file://{}", text(&page)));
+            browser.wait("performance.getEntriesByName('drawn').length === 1");
+            let drawn = browser.ask("return performance.getEntriesByName('drawn')[0].startTime");
+            let shown = browser.ask("return document.querySelector('#shown').textContent");
+            eprintln!("{name}, {width} px: {bytes} bytes, first picture after {drawn} ms; {shown}");
+            browser.ask(LOOK);
+            browser.ask("return picture()");
+            let file = folder.join(format!("{name}-{width}.jpg"));
+            std::fs::write(file, browser.snapshot()).expect("writable");
+        }
+        assert_eq!(browser.complaints(), Vec::<Value>::new());
+    }
+}
+
 /// At every width, light and dark: nothing wider than the screen, and everything to be operated has a
 /// name. Pictures of it are left in the target folder.
 fn check_looks(browser: &Browser, what: &str) {
@@ -402,7 +434,7 @@ fn check_looks(browser: &Browser, what: &str) {
             browser.screen(width, height, scheme);
             let wide = browser.ask("return document.documentElement.scrollWidth");
             assert_eq!(wide, json!(width), "{what}, {scheme}");
-            let file = format!("view-{what}-{width}-{scheme}.png.base64");
+            let file = format!("view-{what}-{width}-{scheme}.png");
             let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(file);
             std::fs::write(file, browser.picture()).expect("writable");
         }

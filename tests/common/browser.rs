@@ -7,6 +7,7 @@ use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 use serde_json::{Value, json};
 
 /// Far longer than any answer takes.
@@ -117,11 +118,20 @@ impl Browser {
         self.tell("Emulation.setEmulatedMedia", &media);
     }
 
-    /// A picture of all of the page, as PNG in base 64.
-    pub fn picture(&self) -> String {
-        let whole = json!({"format": "png", "captureBeyondViewport": true});
-        let taken = self.tell("Page.captureScreenshot", &whole);
-        taken["data"].as_str().expect("a picture").to_owned()
+    /// A picture of all of the page, as PNG.
+    pub fn picture(&self) -> Vec<u8> {
+        self.capture(&json!({"format": "png", "captureBeyondViewport": true}))
+    }
+
+    /// A picture of what is on the screen, as JPEG.
+    pub fn snapshot(&self) -> Vec<u8> {
+        self.capture(&json!({"format": "jpeg", "quality": 80}))
+    }
+
+    fn capture(&self, how: &Value) -> Vec<u8> {
+        let taken = self.tell("Page.captureScreenshot", how);
+        let data = taken["data"].as_str().expect("a picture");
+        BASE64_STANDARD.decode(data).expect("base 64")
     }
 
     /// What the browser complained of.

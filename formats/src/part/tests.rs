@@ -167,7 +167,7 @@ fn a_torus_of_patches_is_a_torus() {
 #[test]
 fn the_lasts_are_read_as_they_are_described() {
     if let Some(path) = shared("last_3surfaces.step") {
-        let shown = inspect(&path, None).expect("valid").to_string();
+        let shown = inspect(&path, None).expect("valid").0.to_string();
         assert!(
             shown.starts_with("last_3surfaces.step: 3 bodies, millimetre\n"),
             "{shown}"
@@ -176,7 +176,7 @@ fn the_lasts_are_read_as_they_are_described() {
         assert_eq!(shown.matches("6 × 16 poles").count(), 2, "{shown}");
     }
     if let Some(path) = shared("last_scan.stl") {
-        let shown = inspect(&path, None).expect("valid").to_string();
+        let shown = inspect(&path, None).expect("valid").0.to_string();
         assert!(
             shown.contains("6784 triangles, 3394 vertices, watertight, 841.4 cm³"),
             "{shown}"
@@ -246,7 +246,7 @@ fn foreign_iges_is_read_whole_or_refused() {
     };
     let error = read(&path, &READING).expect_err("its faces are trimmed");
     assert!(matches!(error, Error::Trimmed { .. }), "{error}");
-    let shown = inspect(&path, None).expect("valid");
+    let (shown, _) = inspect(&path, None).expect("valid");
     assert_eq!(shown.bodies.len(), 45);
     assert!(
         shown

@@ -2,7 +2,7 @@ use horma_core::{Body, Mesh, Part, Rays, Record, Shape, ToolPath, Touch, Traject
 
 use super::*;
 use crate::preview::sheets;
-use crate::report::PathStatistics;
+use crate::report::{PathStatistics, Report};
 
 fn part() -> Part {
     let corners = vec![[0.0; 3], [10.0, 0.0, 0.0], [10.0, 0.0, 8.0]];
