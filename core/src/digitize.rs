@@ -18,7 +18,7 @@ use crate::lanes::LANES;
 use crate::leaf::{Best, FacetLeaf, Leaf, PointLeaf};
 use crate::local::{self, Grids};
 use crate::motion::{Motion, Trajectory};
-use crate::path::{SubTrajectory, Touch};
+use crate::path::{SubTrajectory, ToolPath, Touch, stitch};
 use crate::record::Counters;
 use crate::row::{Row, starts};
 use crate::simd::{Simd, Token};
@@ -130,6 +130,20 @@ impl Digitizer {
             next = end;
         }
         counters
+    }
+
+    /// Digitizes all positions on the current thread pool: the path, and what it cost.
+    ///
+    /// # Panics
+    /// Never: every position comes once.
+    pub fn path(&self, trajectory: &Trajectory) -> (ToolPath, Counters) {
+        let mut chunks = Vec::new();
+        let counters = self.run_chunks(trajectory, 0..trajectory.positions, |chunk, _| {
+            chunks.push(chunk);
+            true
+        });
+        let path = stitch(*trajectory, chunks).expect("every position comes once");
+        (path, counters)
     }
 
     /// Digitizes consecutive positions on this thread, and the moves that begin there.

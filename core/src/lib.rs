@@ -56,13 +56,7 @@
 //! let plan = Plan::new(&part, job, 1 << 30)?;
 //! // Their hierarchy, and the search, on the threads of the current rayon pool.
 //! let digitizer = Digitizer::new(&job, &plan.model.rows, Simd::best());
-//! let mut runs = Vec::new();
-//! let positions = 0..plan.trajectory.positions;
-//! digitizer.run_chunks(&plan.trajectory, positions, |run, _cost| {
-//!     runs.push(run);
-//!     true // go on
-//! });
-//! let path = stitch(plan.trajectory, runs)?;
+//! let (path, _cost) = digitizer.path(&plan.trajectory);
 //!
 //! // After 30 revolutions the wheel stands above the corner at y = 20.
 //! let touch = path.touches[30 * 90].expect("the corner is in reach");
@@ -72,7 +66,8 @@
 //! # }
 //! ```
 //!
-//! Points that lie in rows already go in by [`Model::of_grids`] and [`Plan::over`]. [`verify()`] holds the
+//! [`Digitizer::run_chunks`] delivers a path as it comes, from wherever in it to wherever, and [`stitch()`] joins what
+//! was delivered. Points that lie in rows already go in by [`Model::of_grids`] and [`Plan::over`]. [`verify()`] holds the
 //! path against the part, by a search of its own.
 
 mod error;

@@ -2,7 +2,7 @@
 
 use horma_core::{
     Body, Contact, Cutter, Digitizer, Discretization, Job, Mesh, Method, Motion, MotionKind, Part,
-    Plan, Shape, Simd, ToolPath, stitch,
+    Plan, Shape, Simd, ToolPath,
 };
 
 /// Half the side of the bar, and the radius of a plain wheel; mm.
@@ -62,13 +62,7 @@ fn path(kind: MotionKind, path_tolerance: Option<f64>) -> (ToolPath, u64) {
     let job = job(kind, path_tolerance);
     let plan = Plan::new(&bar(), job, 1 << 30).expect("fits");
     let digitizer = Digitizer::new(&plan.job, &plan.model.rows, Simd::best());
-    let mut parts = Vec::new();
-    let all = 0..plan.trajectory.positions;
-    let counters = digitizer.run_chunks(&plan.trajectory, all, |run, _| {
-        parts.push(run);
-        true
-    });
-    let path = stitch(plan.trajectory, parts).expect("whole");
+    let (path, counters) = digitizer.path(&plan.trajectory);
     (path, counters.beyond_tolerance)
 }
 

@@ -5,15 +5,15 @@ use horma_core::Waypoint;
 use crate::csv;
 
 /// Their names, in order.
-pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+pub fn names() -> impl Iterator<Item = &'static str> {
     csv::HEADER.split(',')
 }
 
 /// How many of them there is a number in at every position.
-pub(crate) const ALWAYS: usize = 3;
+pub const ALWAYS: usize = 3;
 
 /// The numbers of a position, mm and degrees; the last four are nothing where nothing is in reach.
-pub(crate) fn of(waypoint: &Waypoint) -> [Option<f64>; 7] {
+pub fn of(waypoint: &Waypoint) -> [Option<f64>; 7] {
     let Waypoint {
         index,
         x,

@@ -5,7 +5,7 @@
 //! # From a job file to a path
 //!
 //! ```
-//! use horma_core::{Digitizer, Plan, Simd, place, stitch};
+//! use horma_core::{Digitizer, Plan, Simd, place};
 //! use horma_formats::{csv, job, part, sample};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -25,13 +25,7 @@
 //! let part = place(read.part, file.axis)?;
 //! let plan = Plan::new(&part, file.job, 1 << 30)?;
 //! let digitizer = Digitizer::new(&file.job, &plan.model.rows, Simd::best());
-//! let mut runs = Vec::new();
-//! let positions = 0..plan.trajectory.positions;
-//! digitizer.run_chunks(&plan.trajectory, positions, |run, _cost| {
-//!     runs.push(run);
-//!     true
-//! });
-//! let path = stitch(plan.trajectory, runs)?;
+//! let (path, _cost) = digitizer.path(&plan.trajectory);
 //! csv::save(&dir.path().join("path.csv"), &path)?;
 //! # Ok(())
 //! # }
@@ -56,7 +50,7 @@ mod svg;
 
 pub mod also;
 pub mod apt;
-mod columns;
+pub mod columns;
 pub mod csv;
 mod glb;
 pub mod map;

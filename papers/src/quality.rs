@@ -7,7 +7,6 @@
 use horma_core::{
     Contact, Cutter, Digitizer, Discretization, Frame, Grading, Hold, Interval, Job, Last,
     Measures, Method, Motion, MotionKind, Plan, Rays, Shaped, Simd, System, machined, shape,
-    stitch,
 };
 use horma_formats::lasts::ALLOWED;
 use horma_formats::plot::{Curve, Plot, Scale};
@@ -175,13 +174,8 @@ impl Subject {
         };
         let plan = Plan::new(&self.shaped.part, job, MEMORY)?;
         let (rows, trajectory) = (&plan.model.rows, plan.trajectory);
-        let mut chunks = Vec::new();
         let digitizer = Digitizer::new(&job, rows, Simd::best());
-        digitizer.run_chunks(&trajectory, 0..trajectory.positions, |chunk, _| {
-            chunks.push(chunk);
-            true
-        });
-        let path = stitch(trajectory, chunks)?.positions();
+        let path = digitizer.path(&trajectory).0.positions();
         let rays = Rays::over(long, SPACING, COLUMNS)?;
         let surface = machined(rows, &job.cutter, &path, rays, Simd::best())?;
         let (measures, known) = self.last.machined(&self.shaped, &surface, step)?;

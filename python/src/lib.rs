@@ -11,24 +11,24 @@ mod module {
     #[pymodule_export]
     use super::digitize;
 
-    use horma_formats::csv;
+    use horma_formats::columns;
     use pyo3::prelude::*;
     use pyo3::types::PyTuple;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-        let columns: Vec<&str> = csv::HEADER.split(',').collect();
-        module.add("COLUMNS", PyTuple::new(module.py(), columns)?)
+        let names: Vec<&str> = columns::names().collect();
+        module.add("COLUMNS", PyTuple::new(module.py(), names)?)
     }
 }
 
 use std::path::Path;
 
 use horma_core::{
-    Body, Digitizer, Job, Mesh, Model, Part, Plan, Point, Shape, Simd, ToolPath, discretize, stitch,
+    Body, Digitizer, Job, Mesh, Model, Part, Plan, Point, Shape, Simd, ToolPath, discretize,
 };
-use horma_formats::job;
+use horma_formats::{columns, job};
 use numpy::ndarray::{Array2, ArrayView2, ArrayView3};
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray3};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
@@ -163,31 +163,15 @@ fn compute(model: Model, job: Job, threads: usize) -> PyResult<ToolPath> {
         // Python's own arrays are not measured beforehand either.
         let plan = Plan::over(model, job, u64::MAX)?;
         let digitizer = Digitizer::new(&job, &plan.model.rows, Simd::best());
-        let mut runs = Vec::new();
-        let all = 0..plan.trajectory.positions;
-        digitizer.run_chunks(&plan.trajectory, all, |run, _| {
-            runs.push(run);
-            true
-        });
-        stitch(plan.trajectory, runs)
+        Ok(digitizer.path(&plan.trajectory).0)
     });
     path.map_err(refused)
 }
 
 /// The lines of path.csv.
 fn rows(path: &ToolPath) -> Array2<f64> {
-    let mut lines = Array2::from_elem((path.touches.len() + path.between.len(), 7), f64::NAN);
-    for (mut line, waypoint) in lines.rows_mut().into_iter().zip(path.waypoints()) {
-        line[0] = waypoint.index.floor() as f64 + waypoint.index.share();
-        line[1] = waypoint.x;
-        line[2] = waypoint.angle;
-        if let Some(touch) = waypoint.touch {
-            line[3] = touch.height;
-            let [x, y, z] = touch.contact;
-            (line[4], line[5], line[6]) = (x, y, z);
-        }
-    }
-    lines
+    let line = |w| columns::of(&w).map(|n| n.unwrap_or(f64::NAN));
+    Array2::from(path.waypoints().map(line).collect::<Vec<_>>())
 }
 
 fn wrong(error: horma_formats::Error) -> PyErr {

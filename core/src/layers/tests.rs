@@ -3,7 +3,7 @@ use crate::digitize::Digitizer;
 use crate::job::{Contact, Discretization, Job, Method};
 use crate::motion::{Motion, MotionKind};
 use crate::part::{Body, Mesh, Part, Shape};
-use crate::path::{Waypoint, stitch};
+use crate::path::Waypoint;
 use crate::plan::Plan;
 use crate::simd::Simd;
 use crate::solid::Section;
@@ -46,13 +46,8 @@ fn digitized(part: &Part, cutter: Cutter, motion: Motion) -> ToolPath {
         method: Method::Exact,
     };
     let plan = Plan::new(part, job, u64::MAX).expect("a plan");
-    let mut parts = Vec::new();
     let digitizer = Digitizer::new(&job, &plan.model.rows, Simd::best());
-    digitizer.run_chunks(&plan.trajectory, 0..plan.trajectory.positions, |run, _| {
-        parts.push(run);
-        true
-    });
-    stitch(plan.trajectory, parts).expect("whole")
+    digitizer.path(&plan.trajectory).0
 }
 
 const MOTION: Motion = Motion {

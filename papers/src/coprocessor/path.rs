@@ -99,17 +99,9 @@ impl Sample {
 
     /// Heights in doubles, by horma's own search.
     pub fn exact(&self) -> Vec<Option<f64>> {
-        let mut heights = Vec::new();
         let digitizer = Digitizer::new(&self.job, &self.rows, Simd::best());
-        digitizer.run_chunks(
-            &self.trajectory,
-            0..self.trajectory.positions,
-            |chunk, _| {
-                heights.extend(chunk.touches.iter().map(|t| t.map(|t| t.height)));
-                true
-            },
-        );
-        heights
+        let (path, _) = digitizer.path(&self.trajectory);
+        path.touches.iter().map(|t| t.map(|t| t.height)).collect()
     }
 
     /// What the unit does at a position.

@@ -82,7 +82,7 @@ struct Searched {
 impl Searched {
     fn new(configuration: &Configuration) -> Result<Self> {
         let subject = Subject::new(configuration.grid, configuration.turning, RADII)?;
-        let (_, exact) = subject.path(Method::Exact)?;
+        let (_, exact) = subject.path(Method::Exact);
         let by_window = |culling| subject.heuristic(culling).run(WINDOW).1;
         Ok(Self {
             positions: subject.positions(),

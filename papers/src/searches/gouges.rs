@@ -63,7 +63,7 @@ struct Found {
 impl Found {
     fn new((grid, radii): ([u32; 2], [f64; 2])) -> Result<Self> {
         let subject = Subject::new(grid, TURNING, radii)?;
-        let (path, _) = subject.path(Method::Exact)?;
+        let (path, _) = subject.path(Method::Exact);
         let (found, clearances) = verify_everywhere(
             &subject.part,
             &subject.plan.job.cutter,
@@ -220,12 +220,9 @@ mod tests {
         for radii in [RADII, [20.0, 8.0], [40.0, 4.0]] {
             let subject = Subject::new([8, 8], TURNING, radii).expect("the sample");
             let job: Job = subject.plan.job;
-            let mut height = f64::NAN;
             let digitizer = Digitizer::new(&job, &model.rows, Simd::best());
-            digitizer.run_chunks(&trajectory, 0..1, |chunk, _| {
-                height = chunk.touches[0].expect("in reach").height;
-                true
-            });
+            let (path, _) = digitizer.path(&trajectory);
+            let height = path.touches[0].expect("in reach").height;
             let found = radii[0] + radii[1] - height;
             assert!((found - sunk_in_plane(radii, GAP)).abs() < 1e-12, "{found}");
             assert!(found > 3.0 * sunk(radii[0], GAP), "{found}");

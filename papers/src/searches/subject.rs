@@ -6,7 +6,7 @@ use std::time::Instant;
 use horma_core::{
     Contact, Counters, Culling, Cutter, Digitizer, Discretization, Heuristic, Job, Local, Method,
     Motion, MotionKind, Part, Plan, Point, RowKind, Simd, ToolPath, Window, discretize, length,
-    stitch, sub,
+    sub,
 };
 use horma_formats::sample::{self, LastStyle};
 
@@ -89,20 +89,8 @@ impl Subject {
     }
 
     /// The path, and what it cost.
-    ///
-    /// # Errors
-    /// None: every position comes once.
-    pub fn path(&self, method: Method) -> Result<(ToolPath, Counters)> {
-        let mut chunks = Vec::new();
-        let counters = self.digitizer(method).run_chunks(
-            &self.plan.trajectory,
-            0..self.positions(),
-            |chunk, _| {
-                chunks.push(chunk);
-                true
-            },
-        );
-        Ok((stitch(self.plan.trajectory, chunks)?, counters))
+    pub fn path(&self, method: Method) -> (ToolPath, Counters) {
+        self.digitizer(method).path(&self.plan.trajectory)
     }
 
     fn digitizer(&self, method: Method) -> Digitizer {
@@ -185,8 +173,8 @@ mod tests {
             step: 8.0,
         };
         let subject = Subject::new([60, 48], turning, [40.0, 8.0]).expect("the sample");
-        let (exact, few) = subject.path(Method::Exact).expect("a path");
-        let (brute, all) = subject.path(Method::Brute).expect("a path");
+        let (exact, few) = subject.path(Method::Exact);
+        let (brute, all) = subject.path(Method::Brute);
         assert_eq!(exact, brute);
         assert_eq!(all.evaluations, subject.points() * subject.positions());
         assert!(few.evaluations * 20 < all.evaluations, "{few:?}");
@@ -207,7 +195,7 @@ mod tests {
         } = &subject.plan;
         let mut counted = Simd::available().into_iter().map(|simd| {
             let digitizer = Digitizer::new(job, &model.rows, simd);
-            digitizer.run_chunks(trajectory, 0..trajectory.positions, |_, _| true)
+            digitizer.path(trajectory).1
         });
         let first = counted.next().expect("one at least");
         assert!(counted.all(|counters| counters == first));

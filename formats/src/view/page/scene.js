@@ -55,7 +55,7 @@ function scene(canvas) {
     ["turn", "shift", "view", "centre", "zoom", "lift", "size", "paint", "lit"].map((n) => [n, uniform(n)]),
   );
   const solid = solidBuffers(gl, part);
-  const edges = part.edges.length && figure(gl, gl.LINES, part.edges, Uint32Array.from(part.edges, (_, i) => i).subarray(0, part.edges.length / 3));
+  const edges = part.edges.length && figure(gl, gl.LINES, part.edges, Uint32Array.from({ length: part.edges.length / 3 }, (_, i) => i));
   const tool = !alone && solidBuffers(gl, wheel(contents.wheel));
   const order = strip();
   const lines = alone ? {} : { contacts: lineBuffers(gl, path.contacts, order), centres: lineBuffers(gl, centres(), order) };
