@@ -233,7 +233,7 @@ pub fn machined(
 ) -> Result<Machined> {
     crate::verify::check(positions)?;
     let designed = designed(rows, &rays, simd)?;
-    let machined = cut::cut(cutter, positions, &rays);
+    let machined = cut::cut(cutter, positions, &rays, simd);
     let slant = slants(&rays, &designed);
     let both = designed.iter().zip(&machined).zip(slant);
     let deviation = both

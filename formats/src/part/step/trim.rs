@@ -100,12 +100,10 @@ fn parameters(direction: &Direction, points: usize) -> Vec<f64> {
 }
 
 fn lies_on(sides: &[Side], point: Point, tolerance: f64) -> bool {
-    let away = |p: Point| length(sub(p, point));
     let mut candidates: Vec<(f64, usize, &Side)> = sides
         .iter()
         .filter_map(|side| {
-            let tabulated = side.points.iter().map(|&p| away(p)).enumerate();
-            let (nearest, distance) = tabulated.min_by(|a, b| a.1.total_cmp(&b.1))?;
+            let (nearest, distance) = nearest_of(&side.points, point)?;
             Some((distance, nearest, side))
         })
         .collect();
@@ -116,22 +114,37 @@ fn lies_on(sides: &[Side], point: Point, tolerance: f64) -> bool {
     })
 }
 
-/// Whether a side passes a point within the tolerance. From the nearest tabulated point on, by
-/// sections: the distance has one minimum near it.
+/// Parts into which a search divides what is left, and how often: down to 10⁻⁷ of a piece.
+const PARTS: usize = 32;
+const DIVISIONS: usize = 6;
+
+/// Whether a side passes a point within the tolerance. From the nearest tabulated point on, by finer and finer
+/// tables: the distance has one minimum near it.
 fn passes(side: &Side, nearest: usize, point: Point, tolerance: f64) -> bool {
-    let at = |v: f64| length(sub(side.surface.grid(&[side.at], &[v])[0], point));
-    let mut low = side.vs[nearest.saturating_sub(1)];
-    let mut high = side.vs[(nearest + 1).min(side.vs.len() - 1)];
-    const SECTION: f64 = 0.618_033_988_749_894_8;
-    for _ in 0..48 {
-        let (a, b) = (high - SECTION * (high - low), low + SECTION * (high - low));
-        let (at_a, at_b) = (at(a), at(b));
-        if at_a.min(at_b) <= tolerance {
+    let around = |nearest: usize, vs: &[f64]| {
+        let last = vs.len() - 1;
+        (vs[nearest.saturating_sub(1)], vs[(nearest + 1).min(last)])
+    };
+    let (mut low, mut high) = around(nearest, &side.vs);
+    for _ in 0..DIVISIONS {
+        let width = (high - low) / PARTS as f64;
+        let vs: Vec<f64> = (0..=PARTS).map(|i| low + width * i as f64).collect();
+        let points = side.surface.grid(&[side.at], &vs);
+        let Some((nearest, distance)) = nearest_of(&points, point) else {
+            return false;
+        };
+        if distance <= tolerance {
             return true;
         }
-        if at_a < at_b { high = b } else { low = a }
+        (low, high) = around(nearest, &vs);
     }
     false
+}
+
+/// Which of some points is nearest to a place, and how far away it is.
+fn nearest_of(points: &[Point], place: Point) -> Option<(usize, f64)> {
+    let away = points.iter().map(|&p| length(sub(p, place))).enumerate();
+    away.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Points of an edge, mm; `None` if its curve cannot be read.
