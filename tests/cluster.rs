@@ -155,6 +155,42 @@ fn surfaces_take_less_than_a_hundredth_of_the_bytes_of_their_points() {
     assert!(100 * surface < overlap, "{surface} {overlap}");
 }
 
+/// Packed points are a third of the bytes, and the same everywhere.
+#[test]
+fn packed_points_are_the_same_on_any_number_of_workers() {
+    let (dir, sample) = (scratch(), sample());
+    let packed = ["--coordinates", "packed21"];
+    let doubles = path_of(&sample, dir.path(), "doubles", &["--workers", "2"]);
+    let bytes = |name: &str| report(&dir.path().join(name))["traffic"]["bytes_to_workers"].as_f64();
+    let alone = path_of(&sample, dir.path(), "alone", &packed);
+    assert!(alone != doubles);
+    for distribution in DISTRIBUTIONS {
+        for count in ["2", "5"] {
+            let how = ["--workers", count, "--distribution", distribution];
+            let name = format!("{distribution}-{count}");
+            let path = path_of(&sample, dir.path(), &name, &[&how[..], &packed].concat());
+            assert!(path == alone, "{name}");
+            check_traffic(distribution, &report(&dir.path().join(name)));
+        }
+    }
+    let share = bytes("overlap-2").zip(bytes("doubles")).map(|(p, d)| p / d);
+    assert!(
+        share.is_some_and(|s| (0.33..0.36).contains(&s)),
+        "{share:?}"
+    );
+    let report = report(&dir.path().join("alone"));
+    for body in report["bodies"].as_array().expect("bodies") {
+        let [rounding, deviation] = ["rounding", "deviation"].map(|key| body[key].as_f64());
+        let rounding = rounding.expect("a number");
+        assert!((4.2e-4..4.3e-4).contains(&rounding), "{rounding}");
+        // It is part of what the tolerance allows.
+        assert!(
+            deviation.is_some_and(|d| d > rounding && d <= 0.01),
+            "{deviation:?}"
+        );
+    }
+}
+
 /// Each worker has several extents, and in halo holds the rows of several.
 #[test]
 fn more_extents_than_workers_are_the_same() {

@@ -445,7 +445,7 @@ async fn submit_raw(address: &str, key: u8) -> Result<u64, Status> {
         }),
         contact: wire::Contact::Facet.into(),
         method: wire::Method::Exact.into(),
-        local: None,
+        ..Job::default()
     };
     let header = SubmitHeader {
         version: horma_proto::VERSION.to_owned(),

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use crate::error::{Error, Result};
 use crate::grid::SurfaceGrid;
-use crate::job::Discretization;
+use crate::job::{Coordinates, Discretization};
 use crate::part::{Body, Mesh, Part, Shape};
 use crate::record::BodyRecord;
 use crate::refine::refine;
@@ -86,48 +86,74 @@ impl Model {
     }
 }
 
-/// Makes the rows of every body.
+/// Makes the rows of every body, their coordinates doubles.
 ///
 /// # Errors
 /// [`Error::EmptyPart`], [`Error::GridTooLarge`] or [`Error::ToleranceNotReached`].
 pub fn discretize(part: &Part, discretization: Discretization) -> Result<Model> {
-    Ok(fill(&layout(part, discretization)?))
+    Ok(fill(&layout(part, discretization, Coordinates::Double)?))
 }
 
 /// A body as it is going to be discretized.
-pub(crate) enum Layout<'a> {
-    Mesh(&'a str, &'a Mesh),
-    Grid(&'a str, Surface, Lines),
+pub(crate) struct Layout<'a> {
+    name: &'a str,
+    shape: LayoutShape<'a>,
+    coordinates: Coordinates,
+}
+
+enum LayoutShape<'a> {
+    Mesh(&'a Mesh),
+    Grid(Surface, Lines),
 }
 
 impl Layout<'_> {
     /// Number of points, or of pairs of facets if these are more.
     pub fn points(&self) -> f64 {
-        match self {
-            Self::Mesh(_, mesh) => mesh.vertices().len().max(mesh.triangles().len() / 2) as f64,
-            Self::Grid(_, _, grid) => grid.us.len() as f64 * grid.vs.len() as f64,
+        match &self.shape {
+            LayoutShape::Mesh(mesh) => mesh.vertices().len().max(mesh.triangles().len() / 2) as f64,
+            LayoutShape::Grid(_, grid) => grid.us.len() as f64 * grid.vs.len() as f64,
         }
     }
 }
 
 /// Decides on the lines of every grid, and makes none yet.
-pub(crate) fn layout(part: &Part, discretization: Discretization) -> Result<Vec<Layout<'_>>> {
+pub(crate) fn layout(
+    part: &Part,
+    discretization: Discretization,
+    coordinates: Coordinates,
+) -> Result<Vec<Layout<'_>>> {
     part.validate()?;
     discretization.validate()?;
+    let chordal = coordinates.chordal(discretization)?;
     let bodies = part.bodies.iter();
     bodies
-        .map(|body| layout_body(body, discretization))
+        .map(|body| layout_body(body, chordal, coordinates))
         .collect()
 }
 
-fn layout_body(body: &Body, discretization: Discretization) -> Result<Layout<'_>> {
-    Ok(match &body.shape {
-        Shape::Mesh(mesh) => Layout::Mesh(&body.name, mesh),
-        Shape::Surface(surface) => {
-            let surface = surface.clone().along_x();
-            let grid = lines(&body.name, &surface, discretization)?;
-            Layout::Grid(&body.name, surface, grid)
+fn layout_body(
+    body: &Body,
+    discretization: Discretization,
+    coordinates: Coordinates,
+) -> Result<Layout<'_>> {
+    let name = &body.name;
+    let shape = match &body.shape {
+        Shape::Mesh(mesh) => {
+            coordinates.check(name, mesh.vertices())?;
+            LayoutShape::Mesh(mesh)
         }
+        Shape::Surface(surface) => {
+            // Its net of poles holds the surface.
+            coordinates.check(name, surface.poles())?;
+            let surface = surface.clone().along_x();
+            let grid = lines(name, &surface, discretization)?;
+            LayoutShape::Grid(surface, grid)
+        }
+    };
+    Ok(Layout {
+        name,
+        shape,
+        coordinates,
     })
 }
 
@@ -163,22 +189,30 @@ pub(crate) fn survey(bodies: &[Layout], mut take: impl FnMut(Row)) -> Survey {
             outlines.push(row.outline());
             take(row);
         };
-        let (name, columns, deviation) = match body {
-            Layout::Mesh(name, mesh) => {
-                slabs(mesh, first).for_each(add);
-                (name, None, None)
+        let Layout {
+            name,
+            shape,
+            coordinates,
+        } = body;
+        let (columns, deviation) = match shape {
+            LayoutShape::Mesh(mesh) => {
+                slabs(mesh, *coordinates, first).for_each(add);
+                (None, None)
             }
-            Layout::Grid(name, surface, lines) => {
-                let grid = SurfaceGrid::whole(name, surface, lines, first);
+            LayoutShape::Grid(surface, lines) => {
+                let grid = SurfaceGrid::whole(name, surface, lines, *coordinates, first);
                 grid.rows(&mut add);
                 survey.grids.push(grid);
-                (name, Some(lines.vs.len() as u32), lines.deviation)
+                let deviation = lines.deviation.map(|d| d + coordinates.error());
+                (Some(lines.vs.len() as u32), deviation)
             }
         };
         let name = (*name).to_owned();
-        survey
-            .bodies
-            .push(joined(name, &mut outlines, columns, deviation));
+        let joined = joined(name, &mut outlines, columns, deviation);
+        survey.bodies.push(BodyRecord {
+            rounding: coordinates.error(),
+            ..joined
+        });
         survey.outlines.extend(outlines);
     }
     survey
@@ -201,6 +235,7 @@ fn joined(
         facets: outlines.iter().map(|r| r.facets).sum(),
         x: [x.low, x.high],
         deviation,
+        rounding: 0.0,
     }
 }
 
@@ -242,7 +277,7 @@ fn evenly(direction: &Direction, n: usize) -> Vec<f64> {
 }
 
 /// The slabs of a mesh, their ids counted on from `first`.
-fn slabs(mesh: &Mesh, first: u32) -> impl Iterator<Item = Row> {
+fn slabs(mesh: &Mesh, coordinates: Coordinates, first: u32) -> impl Iterator<Item = Row> {
     let vertex = |v: u32| mesh.vertices()[v as usize];
     let middle = |t: &[u32; 3]| t.iter().map(|&v| vertex(v)[0]).sum::<f64>();
     let mut order: Vec<[u32; 3]> = mesh.triangles().to_vec();
@@ -256,7 +291,7 @@ fn slabs(mesh: &Mesh, first: u32) -> impl Iterator<Item = Row> {
         let facets = slab.iter().map(|t| {
             t.map(|v| {
                 *local.entry(v).or_insert_with(|| {
-                    points.push(vertex(v));
+                    points.push(coordinates.round(vertex(v)));
                     points.len() as u32 - 1
                 })
             })

@@ -135,6 +135,28 @@ pub enum Error {
         /// Greatest magnitude, mm.
         limit: f64,
     },
+    /// A coordinate that does not fit into 21 bits.
+    #[error(
+        "{name}: a coordinate of {value} mm is beyond the {limit} mm that packed21 reaches; move the part nearer to the origin by its axis, or leave its coordinates double"
+    )]
+    TooFarToPack {
+        /// Name of the body.
+        name: String,
+        /// The coordinate as found, mm.
+        value: f64,
+        /// Greatest magnitude, mm.
+        limit: f64,
+    },
+    /// A chordal tolerance that rounding uses up.
+    #[error(
+        "tolerance is {tolerance} mm, of which rounding to packed21 takes {error:.6}; take a coarser one, or leave coordinates double"
+    )]
+    ToleranceTooFine {
+        /// As asked for, mm.
+        tolerance: f64,
+        /// How far rounded points are off, mm.
+        error: f64,
+    },
     /// A B-spline surface whose numbers contradict each other.
     #[error("{name}: {reason}")]
     BadSurface {

@@ -207,7 +207,7 @@ impl Reach {
 pub(crate) mod tests {
     use super::*;
     use crate::cutter::Cutter;
-    use crate::job::{Contact, Discretization};
+    use crate::job::{Contact, Coordinates, Discretization};
     use crate::motion::{Motion, MotionKind};
     use crate::runs::interior_first;
     use proptest::prelude::*;
@@ -225,6 +225,7 @@ pub(crate) mod tests {
                 path_tolerance,
                 lead: [0.0; 2],
             },
+            coordinates: Coordinates::Double,
             contact: Contact::Point,
             method: Method::Exact,
         }

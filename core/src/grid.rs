@@ -7,6 +7,7 @@
 use crate::discretize::Lines;
 use crate::error::{Error, Result};
 use crate::evaluate::{Isoline, Isolines, Net};
+use crate::job::Coordinates;
 use crate::row::{Row, RowKind};
 use crate::surface::Surface;
 
@@ -23,11 +24,19 @@ pub struct SurfaceGrid {
     pub vs: Vec<f64>,
     /// Id of the surface's last row, which joins none.
     pub last: u32,
+    /// What the points are rounded to.
+    pub coordinates: Coordinates,
 }
 
 impl SurfaceGrid {
     /// All rows of a surface, their ids counted on from `first`.
-    pub(crate) fn whole(name: &str, surface: &Surface, lines: &Lines, first: u32) -> Self {
+    pub(crate) fn whole(
+        name: &str,
+        surface: &Surface,
+        lines: &Lines,
+        coordinates: Coordinates,
+        first: u32,
+    ) -> Self {
         let us: Vec<(u32, f64)> = (first..).zip(lines.us.iter().copied()).collect();
         Self {
             name: name.to_owned(),
@@ -35,6 +44,7 @@ impl SurfaceGrid {
             last: us.last().map_or(first, |u| u.0),
             us,
             vs: lines.vs.clone(),
+            coordinates,
         }
     }
 
@@ -42,13 +52,7 @@ impl SurfaceGrid {
     pub fn only(&self, ids: &[u32]) -> Option<Self> {
         let wanted = |&(id, _): &(u32, f64)| ids.binary_search(&id).is_ok();
         let us: Vec<_> = self.us.iter().copied().filter(|u| wanted(u)).collect();
-        (!us.is_empty()).then(|| Self {
-            name: self.name.clone(),
-            surface: self.surface.clone(),
-            us,
-            vs: self.vs.clone(),
-            last: self.last,
-        })
+        (!us.is_empty()).then(|| Self { us, ..self.clone() })
     }
 
     /// Checks a grid that came from outside.
@@ -89,7 +93,8 @@ impl SurfaceGrid {
         let mut line = Isoline::default();
         for &(id, u) in &self.us {
             isolines.at(u, &mut line);
-            let points = (0..self.vs.len()).map(|j| line.points.point(j));
+            let point = |j| self.coordinates.round(line.points.point(j));
+            let points = (0..self.vs.len()).map(point);
             take(Row {
                 id,
                 points: points.collect(),
@@ -105,7 +110,7 @@ impl SurfaceGrid {
 mod tests {
     use super::*;
     use crate::discretize::discretize;
-    use crate::job::Discretization;
+    use crate::job::{Coordinates, Discretization};
     use crate::part::{Body, Part, Shape};
     use crate::surface::tests::quarter_cylinder;
 
@@ -133,13 +138,22 @@ mod tests {
             vs: evenly(columns).collect(),
             deviation: None,
         };
-        let grid = SurfaceGrid::whole("body", &surface.along_x(), &lines, 0);
+        let whole = |coordinates| {
+            SurfaceGrid::whole("body", &surface.clone().along_x(), &lines, coordinates, 0)
+        };
+        let grid = whole(Coordinates::Double);
         assert_eq!(made(&grid), all);
         let some = grid.only(&[3, 4, 39, 50]).expect("three of them");
         some.validate().expect("valid");
         let wanted = [3, 4, 39].map(|i: usize| all[i].clone());
         assert_eq!(made(&some), wanted);
         assert_eq!(grid.only(&[40]), None);
+
+        for (rounded, row) in made(&whole(Coordinates::Packed21)).iter().zip(&all) {
+            let expected = row.points.iter().map(|&p| Coordinates::Packed21.round(p));
+            assert_eq!(rounded.points, expected.collect::<Vec<_>>());
+            assert_ne!(rounded.points, row.points);
+        }
     }
 
     #[test]
@@ -150,6 +164,7 @@ mod tests {
             us: vec![(3, 0.0), (4, 1.0)],
             vs: vec![0.0, 0.5],
             last: 4,
+            coordinates: Coordinates::Double,
         };
         good.validate().expect("valid");
         let bad: [fn(&mut SurfaceGrid); 5] = [

@@ -7,12 +7,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result, bounded};
 use crate::motion::Motion;
+use crate::packed::Packing;
+use crate::vector::Point;
 
 /// How to digitize a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Job {
     /// From surfaces to points and facets.
     pub discretization: Discretization,
+    /// What the coordinates of these points are rounded to.
+    pub coordinates: Coordinates,
     /// The wheel.
     pub cutter: Cutter,
     /// The spiral.
@@ -28,9 +32,10 @@ impl Job {
     ///
     /// # Errors
     /// Those of [`Discretization::validate`], [`Motion::validate`] and [`Method::validate`];
-    /// [`crate::Error::PathToleranceNeedsFallback`].
+    /// [`crate::Error::ToleranceTooFine`], [`crate::Error::PathToleranceNeedsFallback`].
     pub fn validate(&self) -> Result<()> {
         self.discretization.validate()?;
+        self.coordinates.chordal(self.discretization)?;
         self.motion.validate()?;
         self.method.validate(self.contact)?;
         match self.method {
@@ -73,6 +78,67 @@ impl Discretization {
                 let ok = t >= MIN_TOLERANCE && t.is_finite();
                 bounded("tolerance", t, ok, "at least 0.000001 mm")
             }
+        }
+    }
+}
+
+/// What the coordinates of rows are rounded to, by whoever makes them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Coordinates {
+    /// Doubles, as they come.
+    #[default]
+    Double,
+    /// Words of 21 bits, 11 of them after the point: a point travels in 64 bits, as in the coprocessor paper.
+    Packed21,
+}
+
+impl Coordinates {
+    /// How far a point can be from where it was, mm, if it is within reach: half a unit along each axis.
+    pub fn error(self) -> f64 {
+        match self {
+            Self::Double => 0.0,
+            Self::Packed21 => Packing::POINTS.error() * 3.0_f64.sqrt(),
+        }
+    }
+
+    /// The nearest point that there is.
+    pub(crate) fn round(self, point: Point) -> Point {
+        match self {
+            Self::Double => point,
+            Self::Packed21 => Packing::POINTS.round(point),
+        }
+    }
+
+    /// What is left of a chordal tolerance once points are rounded: a corner of a facet moves by no more than
+    /// [`Coordinates::error`], and no place between corners moves further than these.
+    ///
+    /// # Errors
+    /// [`Error::ToleranceTooFine`] if nothing is.
+    pub(crate) fn chordal(self, discretization: Discretization) -> Result<Discretization> {
+        let Discretization::Tolerance(tolerance) = discretization else {
+            return Ok(discretization);
+        };
+        let (left, error) = (tolerance - self.error(), self.error());
+        if left < MIN_TOLERANCE {
+            return Err(Error::ToleranceTooFine { tolerance, error });
+        }
+        Ok(Discretization::Tolerance(left))
+    }
+
+    /// Checks that a coordinate of a body can be told apart from others.
+    ///
+    /// # Errors
+    /// [`Error::TooFarToPack`]
+    pub(crate) fn check(self, name: &str, points: &[Point]) -> Result<()> {
+        let limit = Packing::POINTS.limit();
+        let beyond = |c: &&f64| self == Self::Packed21 && c.abs() > limit;
+        match points.iter().flatten().find(beyond) {
+            None => Ok(()),
+            Some(&value) => Err(Error::TooFarToPack {
+                name: name.to_owned(),
+                value,
+                limit,
+            }),
         }
     }
 }

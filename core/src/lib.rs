@@ -48,6 +48,7 @@
 //!         lead: [0.0; 2],
 //!         path_tolerance: None,
 //!     },
+//!     coordinates: Coordinates::Double,
 //!     contact: Contact::Facet,
 //!     method: Method::Exact,
 //! };
@@ -141,7 +142,7 @@ pub use error::{Error, Result};
 pub use extent::{Extent, Halo};
 pub use feed::{AxisLimits, Bound, Limits, Peak, Steady, Timing, peaks, steady, timing};
 pub use grid::SurfaceGrid;
-pub use job::{Contact, Culling, Discretization, Distribution, Job, Local, Method};
+pub use job::{Contact, Coordinates, Culling, Discretization, Distribution, Job, Local, Method};
 pub use job::{Sharing, Window};
 pub use keep_out::{KeepOut, Raised, keep_out};
 pub use last::{Choice, Frame, Grading, Hold, Landmark, Landmarks, Last, Measures, Scale, Shaped};

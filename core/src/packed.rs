@@ -35,6 +35,9 @@ pub struct Packing {
 }
 
 impl Packing {
+    /// That of points of parts, mm: 11 bits after the point, for half a metre on either side of the origin.
+    pub const POINTS: Self = Self { fraction: 11 };
+
     /// So many bits after the point. With 11, coordinates go to half a metre on either side, and what is packed
     /// is within 2⁻¹² mm.
     ///
@@ -70,6 +73,25 @@ impl Packing {
         unpack_words(packed).map(|word| libm::ldexp(f64::from(word), -(self.fraction as i32)))
     }
 
+    /// The nearest point that [`Packing::unpack`] can give, if a word holds it.
+    pub fn round(self, point: Point) -> Point {
+        let fraction = self.fraction as i32;
+        // There is but one zero.
+        point.map(|c| libm::ldexp(libm::rint(libm::ldexp(c, fraction)), -fraction) + 0.0)
+    }
+
+    /// The word of a point that is one of these to the last bit, and nothing otherwise.
+    pub fn pack_exactly(self, point: Point) -> Option<u64> {
+        let packed = self.pack(point).ok()?;
+        let same = self.unpack(packed).map(f64::to_bits) == point.map(f64::to_bits);
+        same.then_some(packed)
+    }
+
+    /// The greatest coordinate that there is a word for, mm.
+    pub fn limit(self) -> f64 {
+        libm::ldexp(f64::from((1 << (BITS - 1)) - 1), -(self.fraction as i32))
+    }
+
     /// How far a coordinate can be from what it was, mm.
     pub fn error(self) -> f64 {
         libm::ldexp(0.5, -(self.fraction as i32))
@@ -95,6 +117,9 @@ mod tests {
         fn a_point_comes_back_within_the_error(point in proptest::array::uniform3(-511.9..511.9), fraction in 0_u32..=11) {
             let packing = Packing::new(fraction).expect("valid");
             let back = packing.unpack(packing.pack(point).expect("in range"));
+            prop_assert_eq!(packing.round(point).map(f64::to_bits), back.map(f64::to_bits));
+            prop_assert_eq!(packing.pack_exactly(back), packing.pack(point).ok());
+            prop_assert_eq!(packing.pack_exactly(point).is_some(), back == point);
             for k in 0..3 {
                 prop_assert!((back[k] - point[k]).abs() <= packing.error());
             }
@@ -107,6 +132,14 @@ mod tests {
         let ends = [-512.0, 512.0 - 1.0 / 2048.0, 0.0];
         assert_eq!(packing.unpack(packing.pack(ends).expect("in range")), ends);
         assert_eq!(packing.error(), 1.0 / 4096.0);
+        assert_eq!(packing.limit(), ends[1]);
+        assert_eq!(packing.pack_exactly([0.0, -0.0, 0.0]), None);
+        assert!(
+            packing
+                .round([-1.0e-9; 3])
+                .iter()
+                .all(|c| c.is_sign_positive())
+        );
         for beyond in [512.0, -512.1, f64::NAN, f64::INFINITY] {
             let packed = packing.pack([0.0, beyond, 0.0]);
             assert!(matches!(packed, Err(Error::OutOfBounds { .. })), "{beyond}");

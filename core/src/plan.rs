@@ -269,7 +269,7 @@ fn lay_out<'a>(
     let upper = job.motion.over(hull(part), job.cutter.half_width())?;
     let check = |points| check_memory(points, point_bytes, upper.positions, memory);
     check(points(part, job.discretization))?;
-    let layout = layout(part, job.discretization)?;
+    let layout = layout(part, job.discretization, job.coordinates)?;
     let needed = check(layout.iter().map(Layout::points).sum())?;
     Ok((layout, needed))
 }

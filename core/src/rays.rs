@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::cutter::Cutter;
 use crate::digitize::Digitizer;
 use crate::error::{Error, Result, bounded};
-use crate::job::{Contact, Discretization, Job, Method};
+use crate::job::{Contact, Coordinates, Discretization, Job, Method};
 use crate::motion::{Motion, MotionKind, Trajectory};
 use crate::row::Row;
 use crate::simd::Simd;
@@ -263,6 +263,7 @@ fn designed(rows: &[Row], rays: &Rays, simd: Simd) -> Result<Vec<Option<f64>>> {
             path_tolerance: None,
             lead: [0.0; 2],
         },
+        coordinates: Coordinates::Double,
         contact: Contact::Facet,
         method: Method::Exact,
     };

@@ -54,9 +54,11 @@ pub struct BodyRecord {
     pub facets: u64,
     /// Extent along the spindle, mm.
     pub x: [f64; 2],
-    /// Largest distance from the surface to its facets that sampling found, mm; nothing if the
-    /// grid's size was given or the body is a mesh.
+    /// Largest distance from the surface to its facets that sampling found, with `rounding`, mm; nothing
+    /// if the grid's size was given or the body is a mesh.
     pub deviation: Option<f64>,
+    /// How far its points may be from where they were, as their coordinates are rounded, mm.
+    pub rounding: f64,
 }
 
 /// What a search cost.

@@ -127,7 +127,7 @@ mod tests {
     use super::*;
     use crate::digitize::Digitizer;
     use crate::discretize::discretize;
-    use crate::job::{Contact, Discretization, Job, Method};
+    use crate::job::{Contact, Coordinates, Discretization, Job, Method};
     use crate::motion::{Motion, MotionKind};
     use crate::part::{Body, Mesh, Part, Shape};
     use crate::simd::Simd;
@@ -195,6 +195,7 @@ mod tests {
                 discretization: Discretization::Tolerance(0.01),
                 cutter,
                 motion,
+                coordinates: Coordinates::Double,
                 contact: Contact::Facet,
                 method: Method::Exact,
             };

@@ -1,8 +1,8 @@
 //! Positions between, on a bar whose height is known in closed form at every angle.
 
 use horma_core::{
-    Body, Contact, Cutter, Digitizer, Discretization, Job, Mesh, Method, Motion, MotionKind, Part,
-    Plan, Shape, Simd, ToolPath,
+    Body, Contact, Coordinates, Cutter, Digitizer, Discretization, Job, Mesh, Method, Motion,
+    MotionKind, Part, Plan, Shape, Simd, ToolPath,
 };
 
 /// Half the side of the bar, and the radius of a plain wheel; mm.
@@ -52,6 +52,7 @@ fn job(kind: MotionKind, path_tolerance: Option<f64>) -> Job {
             path_tolerance,
             lead: [0.0; 2],
         },
+        coordinates: Coordinates::Double,
         contact: Contact::Facet,
         method: Method::Exact,
     }

@@ -5,7 +5,8 @@ mod common;
 
 use common::Case;
 use horma_core::{
-    Body, Contact, Cutter, Discretization, Job, Mesh, Method, Motion, MotionKind, Part, Shape,
+    Body, Contact, Coordinates, Cutter, Discretization, Job, Mesh, Method, Motion, MotionKind,
+    Part, Shape,
 };
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -125,6 +126,7 @@ fn a_lid_that_bends_outward_is_not_skipped_where_the_cutter_is_level() {
                     path_tolerance: None,
                     lead: [0.0; 2],
                 },
+                coordinates: Coordinates::Double,
                 contact: Contact::Facet,
                 method: Method::Exact,
             },

@@ -1,8 +1,9 @@
 //! The papers' local search loses the winner where a part has lobes; with its fallback it does not.
 
 use horma_core::{
-    Body, Contact, Counters, Culling, Cutter, Digitizer, Direction, Discretization, Heuristic, Job,
-    Local, Method, Motion, MotionKind, Part, Plan, Shape, Simd, Surface, Touch, Window,
+    Body, Contact, Coordinates, Counters, Culling, Cutter, Digitizer, Direction, Discretization,
+    Heuristic, Job, Local, Method, Motion, MotionKind, Part, Plan, Shape, Simd, Surface, Touch,
+    Window,
 };
 
 /// A bar 100 mm long whose section has three lobes of 30 ± 12 mm.
@@ -56,6 +57,7 @@ fn plan(method: Method) -> Plan {
             path_tolerance: None,
             lead: [0.0; 2],
         },
+        coordinates: Coordinates::Double,
         contact: Contact::Point,
         method,
     };

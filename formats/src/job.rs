@@ -19,8 +19,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use horma_core::{
-    Axis, Contact, Culling, Cutter, Discretization, Distribution, Job, KeepOut, Local, Method,
-    Motion, MotionKind, Point, Sharing, Solid, unit,
+    Axis, Contact, Coordinates, Culling, Cutter, Discretization, Distribution, Job, KeepOut, Local,
+    Method, Motion, MotionKind, Point, Sharing, Solid, unit,
 };
 
 pub use self::last::{LastOf, Side};
@@ -106,6 +106,8 @@ pub struct Overrides {
     pub fallback: Option<bool>,
     /// `discretization.tolerance`, mm; it also takes the place of a grid.
     pub tolerance: Option<f64>,
+    /// `discretization.coordinates`
+    pub coordinates: Option<String>,
     /// `motion.step`, mm
     pub step: Option<f64>,
     /// `motion.points_per_revolution`
@@ -156,6 +158,7 @@ pub fn parse(text: &str, path: &Path, overrides: &Overrides) -> Result<JobFile> 
     let (contact, method) = source.digitizing(&raw)?;
     let job = Job {
         discretization: source.discretization(&raw)?,
+        coordinates: source.coordinates(&raw)?,
         cutter: source.cutter(&raw)?,
         motion: source.motion(&raw)?,
         contact,
@@ -182,6 +185,10 @@ pub fn parse(text: &str, path: &Path, overrides: &Overrides) -> Result<JobFile> 
 }
 
 const KINDS: [(&str, MotionKind); 2] = [("helix", MotionKind::Helix), ("rings", MotionKind::Rings)];
+const COORDINATES: [(&str, Coordinates); 2] = [
+    ("double", Coordinates::Double),
+    ("packed21", Coordinates::Packed21),
+];
 const CONTACTS: [(&str, Contact); 2] = [("facet", Contact::Facet), ("point", Contact::Point)];
 const TRIMMED: [(&str, Trimmed); 2] = [("refuse", Trimmed::Refuse), ("whole", Trimmed::Whole)];
 const METHODS: [(&str, Method); 3] = [
@@ -298,6 +305,11 @@ impl Source<'_> {
                 Err(self.wrong(Some(&grid.at), what))
             }
         }
+    }
+
+    fn coordinates(&self, raw: &RawJob) -> Result<Coordinates> {
+        let given = raw.discretization.coordinates.as_ref();
+        self.choose(given, "coordinates", Coordinates::Double, &COORDINATES)
     }
 
     fn cutter(&self, raw: &RawJob) -> Result<Cutter> {
@@ -473,6 +485,7 @@ impl Source<'_> {
             horma_core::Error::ConeTooSteep { .. } => "half_angle",
             horma_core::Error::EmptyTravel { .. } => "to",
             horma_core::Error::LocalNeedsPoints => "method",
+            horma_core::Error::ToleranceTooFine { .. } => "tolerance",
             horma_core::Error::PathToleranceNeedsFallback => "path_tolerance",
             _ => return Error::Core(error),
         };

@@ -5,8 +5,8 @@ use std::sync::LazyLock;
 
 use bytes::Bytes;
 use horma_core::{
-    Body, Contact, Cutter, Discretization, Distribution, Extent, Handout, Job, Mesh, Method,
-    Motion, MotionKind, Part, Shape, Sharing,
+    Body, Contact, Coordinates, Cutter, Discretization, Distribution, Extent, Handout, Job, Mesh,
+    Method, Motion, MotionKind, Part, Shape, Sharing,
 };
 use horma_proto::wire::submit_request::Kind as Request;
 use horma_proto::wire::{Chunk, SubmitRequest};
@@ -120,6 +120,7 @@ static PLANNED: LazyLock<(Handout, Extent)> = LazyLock::new(|| {
             path_tolerance: Some(0.1),
             lead: [0.0; 2],
         },
+        coordinates: Coordinates::Double,
         contact: Contact::Facet,
         method: Method::Exact,
     };

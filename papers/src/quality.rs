@@ -5,8 +5,8 @@
 //! that errors are those of the path alone.
 
 use horma_core::{
-    Contact, Cutter, Digitizer, Discretization, Frame, Grading, Hold, Interval, Job, Last,
-    Measures, Method, Motion, MotionKind, Plan, Rays, Shaped, Simd, System, machined, shape,
+    Contact, Coordinates, Cutter, Digitizer, Discretization, Frame, Grading, Hold, Interval, Job,
+    Last, Measures, Method, Motion, MotionKind, Plan, Rays, Shaped, Simd, System, machined, shape,
 };
 use horma_formats::lasts::ALLOWED;
 use horma_formats::plot::{Curve, Plot, Scale};
@@ -169,6 +169,7 @@ impl Subject {
                 path_tolerance: None,
                 lead: [0.0; 2],
             },
+            coordinates: Coordinates::Double,
             contact: Contact::Facet,
             method: Method::Exact,
         };

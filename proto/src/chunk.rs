@@ -286,7 +286,7 @@ mod tests {
             .zip(sizes)
             .map(|(id, size)| wire::Row {
                 id,
-                points: vec![id as u8; size].into(),
+                coordinates: Some(wire::row::Coordinates::Points(vec![id as u8; size].into())),
                 kind: None,
             })
             .collect();

@@ -3,9 +3,9 @@
 
 use bytes::Bytes;
 use horma_core::{
-    Body, Contact, Counters, Culling, Cutter, Direction, Discretization, Distribution, Job, Local,
-    Mesh, Method, Motion, MotionKind, Point, Row, RowKind, Shape, Sharing, Surface, SurfaceGrid,
-    Trajectory, Window,
+    Body, Contact, Coordinates, Counters, Culling, Cutter, Direction, Discretization, Distribution,
+    Job, Local, Mesh, Method, Motion, MotionKind, Packing, Point, Row, RowKind, Shape, Sharing,
+    Surface, SurfaceGrid, Trajectory, Window,
 };
 
 use crate::error::{Error, Result};
@@ -64,6 +64,7 @@ pub fn job_to_wire(job: &Job) -> wire::Job {
         }
         .into(),
         local: local_to_wire(job.method),
+        packed21: job.coordinates == Coordinates::Packed21,
     }
 }
 
@@ -95,6 +96,7 @@ pub fn job_from_wire(job: &wire::Job) -> Result<Job> {
     };
     let job = Job {
         discretization,
+        coordinates: coordinates_from_wire(job.packed21),
         cutter,
         motion,
         contact: match job.contact() {
@@ -114,6 +116,14 @@ pub fn job_from_wire(job: &wire::Job) -> Result<Job> {
     };
     job.validate()?;
     Ok(job)
+}
+
+fn coordinates_from_wire(packed21: bool) -> Coordinates {
+    if packed21 {
+        Coordinates::Packed21
+    } else {
+        Coordinates::Double
+    }
 }
 
 /// The local search, if that is the method. Workers have its fallback in any case.
@@ -226,12 +236,22 @@ pub fn trajectory_from_wire(t: Option<&wire::Trajectory>) -> Result<Trajectory> 
     })
 }
 
-/// A row for the wire.
+/// A row for the wire, packed if every point survives that to the last bit.
 pub fn row_to_wire(row: &Row) -> wire::Row {
-    use wire::row::Kind;
+    use wire::row::{Coordinates, Kind};
+    let packed: Option<Vec<u64>> = {
+        let words = row.points.iter().map(|&p| Packing::POINTS.pack_exactly(p));
+        words.collect()
+    };
     wire::Row {
         id: row.id,
-        points: pack_points(&row.points),
+        coordinates: Some(match packed {
+            Some(words) => {
+                let bytes = words.into_iter().flat_map(u64::to_le_bytes);
+                Coordinates::Packed21(bytes.collect())
+            }
+            None => Coordinates::Points(pack_points(&row.points)),
+        }),
         kind: Some(match &row.kind {
             &RowKind::Isoline { joins_next } => Kind::Isoline(wire::Isoline { joins_next }),
             RowKind::Slab { facets } => Kind::Slab(wire::Slab {
@@ -246,7 +266,7 @@ pub fn row_to_wire(row: &Row) -> wire::Row {
 /// # Errors
 /// [`Error::Missing`], [`Error::Ragged`] or [`Error::Core`].
 pub fn row_from_wire(row: &wire::Row) -> Result<Row> {
-    use wire::row::Kind;
+    use wire::row::{Coordinates, Kind};
     let kind = match row.kind.as_ref().ok_or(missing("row", "a kind"))? {
         Kind::Isoline(isoline) => RowKind::Isoline {
             joins_next: isoline.joins_next,
@@ -255,9 +275,17 @@ pub fn row_from_wire(row: &wire::Row) -> Result<Row> {
             facets: unpack_triangles(&slab.facets)?,
         },
     };
+    let coordinates = row.coordinates.as_ref();
+    let points = match coordinates.ok_or(missing("row", "points"))? {
+        Coordinates::Points(points) => unpack_points(points)?,
+        Coordinates::Packed21(words) => {
+            let point = |word: &[u8; 8]| Packing::POINTS.unpack(u64::from_le_bytes(*word));
+            unpack(words, "packed points", point)?
+        }
+    };
     let row = Row {
         id: row.id,
-        points: unpack_points(&row.points)?,
+        points,
         kind,
     };
     row.validate()?;
@@ -339,6 +367,7 @@ pub fn grid_to_wire(grid: &SurfaceGrid) -> wire::SurfaceGrid {
         us,
         vs: grid.vs.clone(),
         last: grid.last,
+        packed21: grid.coordinates == Coordinates::Packed21,
     }
 }
 
@@ -362,6 +391,7 @@ pub fn grid_from_wire(grid: wire::SurfaceGrid) -> Result<SurfaceGrid> {
         us: grid.ids.into_iter().zip(grid.us).collect(),
         vs: grid.vs,
         last: grid.last,
+        coordinates: coordinates_from_wire(grid.packed21),
     };
     grid.validate()?;
     Ok(grid)
@@ -463,6 +493,7 @@ mod tests {
                 path_tolerance: None,
                 lead: [0.0; 2],
             },
+            coordinates: Coordinates::Double,
             contact: Contact::Facet,
             method: Method::Brute,
         }
@@ -479,6 +510,7 @@ mod tests {
             assert_eq!(job_from_wire(&job_to_wire(&job)), Ok(job));
             job.motion.path_tolerance = Some(0.005);
             job.motion.lead = [4.0, 2.5];
+            job.coordinates = Coordinates::Packed21;
             job.contact = Contact::Point;
             job.method = Method::Local(Local {
                 window: Some(Window {
@@ -518,19 +550,30 @@ mod tests {
 
     #[test]
     fn rows_and_bodies_survive_the_wire() {
-        let points = vec![[0.0, 1.0, -2.5], [1.0, 0.5, 3.0], [2.0, 0.0, 0.0]];
-        for kind in [
-            RowKind::Isoline { joins_next: true },
-            RowKind::Slab {
-                facets: vec![[0, 1, 2]],
-            },
-        ] {
-            let row = Row {
-                id: 7,
-                points: points.clone(),
-                kind,
-            };
-            assert_eq!(row_from_wire(&row_to_wire(&row)), Ok(row));
+        use wire::row::Coordinates;
+        let points = vec![[0.1, 1.0, -2.5], [1.0, 0.5, 3.0], [2.0, 0.0, 0.0]];
+        let mut round = points.clone();
+        round[0][0] = 0.125;
+        for (points, packed) in [(&points, false), (&round, true)] {
+            for kind in [
+                RowKind::Isoline { joins_next: true },
+                RowKind::Slab {
+                    facets: vec![[0, 1, 2]],
+                },
+            ] {
+                let row = Row {
+                    id: 7,
+                    points: points.clone(),
+                    kind,
+                };
+                let sent = row_to_wire(&row);
+                let size = match sent.coordinates.as_ref().expect("points") {
+                    Coordinates::Packed21(words) => (true, words.len()),
+                    Coordinates::Points(doubles) => (false, doubles.len()),
+                };
+                assert_eq!(size, (packed, if packed { 24 } else { 72 }));
+                assert_eq!(row_from_wire(&sent), Ok(row));
+            }
         }
         let mesh = Mesh::new("m", points, vec![[2, 1, 0]]).expect("valid");
         let body = Body {
@@ -554,6 +597,7 @@ mod tests {
             us: vec![(4, 0.25), (7, 1.0)],
             vs: vec![0.0, 0.1 + 0.2, 1.0],
             last: 7,
+            coordinates: Coordinates::Packed21,
         };
         let good = grid_to_wire(&grid);
         assert_eq!(grid_from_wire(good.clone()), Ok(grid));
@@ -570,7 +614,7 @@ mod tests {
     fn a_facet_beyond_its_row_is_refused() {
         let row = wire::Row {
             id: 0,
-            points: pack_points(&[[0.0; 3]; 2]),
+            coordinates: Some(wire::row::Coordinates::Points(pack_points(&[[0.0; 3]; 2]))),
             kind: Some(wire::row::Kind::Slab(wire::Slab {
                 facets: pack_triangles(&[[0, 1, 2]]),
             })),

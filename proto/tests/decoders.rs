@@ -61,6 +61,7 @@ fn good() -> Vec<Vec<u8>> {
         samples::job().encode_to_vec(),
         samples::task(wire::task::Supply::Rows(7)).encode_to_vec(),
         samples::row(7).encode_to_vec(),
+        samples::packed_row(7).encode_to_vec(),
         samples::grid().encode_to_vec(),
         positions.encode_to_vec(),
         reply(Reply::Positions(positions)).encode_to_vec(),

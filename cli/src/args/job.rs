@@ -73,6 +73,15 @@ pub(crate) struct How {
         help_heading = "Instead of the job file's"
     )]
     pub tolerance: Option<f64>,
+    /// Coordinates of points: double, or packed21, which is a third of it on the way to workers and
+    /// 0.0004 mm off
+    #[arg(
+        long,
+        value_name = "KIND",
+        env = "HORMA_COORDINATES",
+        help_heading = "Instead of the job file's"
+    )]
+    pub coordinates: Option<String>,
     /// Travel per revolution, mm
     #[arg(
         long,
@@ -188,6 +197,7 @@ impl How {
             delta_v: self.delta_v,
             fallback: self.no_fallback.then_some(false),
             tolerance: self.tolerance,
+            coordinates: self.coordinates.clone(),
             step: self.step,
             points_per_revolution: self.points_per_revolution,
             from: self.from,

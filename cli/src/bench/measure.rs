@@ -6,8 +6,8 @@
 use std::time::Instant;
 
 use horma_core::{
-    Contact, Cutter, Digitizer, Discretization, Interval, Job, Method, Motion, Outline, Part, Row,
-    Shape, Simd, Trajectory, discretize,
+    Contact, Coordinates, Cutter, Digitizer, Discretization, Interval, Job, Method, Motion,
+    Outline, Part, Row, Shape, Simd, Trajectory, discretize,
 };
 use horma_proto::VERSION;
 use rayon::ThreadPool;
@@ -110,6 +110,7 @@ impl Model {
         let job = Job {
             // Already done.
             discretization: Discretization::Grid { rows, columns },
+            coordinates: Coordinates::Double,
             cutter,
             motion,
             contact,

@@ -1,6 +1,6 @@
 use super::*;
 use crate::digitize::Digitizer;
-use crate::job::{Contact, Discretization, Job, Method};
+use crate::job::{Contact, Coordinates, Discretization, Job, Method};
 use crate::motion::{Motion, MotionKind};
 use crate::part::{Body, Mesh, Part, Shape};
 use crate::path::Waypoint;
@@ -42,6 +42,7 @@ fn digitized(part: &Part, cutter: Cutter, motion: Motion) -> ToolPath {
         discretization: Discretization::Tolerance(0.01),
         cutter,
         motion,
+        coordinates: Coordinates::Double,
         contact: Contact::Facet,
         method: Method::Exact,
     };

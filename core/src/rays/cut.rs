@@ -133,26 +133,21 @@ impl Row {
         let mut all = Vec::with_capacity(directions.len());
         for (column, &direction) in directions.iter().enumerate() {
             let home = column * LOTS / directions.len();
-            let mut first = f64::INFINITY;
             let mut met = aside;
-            let mut look = |away: usize, first: &mut f64| {
-                let lot = &self.lots[(home + away) % LOTS];
-                let nearest = nearest(simd, &self.discs[lot.discs.clone()], direction);
-                if nearest < *first {
-                    *first = nearest;
-                    met = away;
-                }
-            };
-            look(aside, &mut first);
+            let lot = |away: usize| &self.lots[(home + away) % LOTS];
+            let mut first = nearest(simd, &self.discs[lot(aside).discs.clone()], direction);
             for (away, bound) in bounds.iter().enumerate() {
                 if bound.soonest >= first {
                     break;
                 }
                 let sides = [away, LOTS - away];
                 for side in &sides[..if away == 0 { 1 } else { 2 }] {
-                    let gap = self.lots[(home + side) % LOTS].gap;
-                    if bound.soonest + bound.slope * (gap - self.gap) < first {
-                        look(*side, &mut first);
+                    let lot = lot(*side);
+                    if bound.soonest + bound.slope * (lot.gap - self.gap) < first {
+                        let nearest = nearest(simd, &self.discs[lot.discs.clone()], direction);
+                        if nearest < first {
+                            (first, met) = (nearest, *side);
+                        }
                     }
                 }
             }
@@ -203,8 +198,9 @@ fn nearest<S: fearless_simd::Simd>(simd: S, discs: &[Discs], (cos, sin): (f64, f
     let never = f64x8::splat(simd, f64::INFINITY);
     let mut nearest = never;
     for discs in discs {
-        let [radius, y, z] =
-            [discs.radius, discs.y, discs.z].map(|all| f64x8::from_slice(simd, &all));
+        let radius = f64x8::from_slice(simd, &discs.radius);
+        let y = f64x8::from_slice(simd, &discs.y);
+        let z = f64x8::from_slice(simd, &discs.z);
         // The centres along the ray and square to it.
         let along = y * cos - z * sin;
         let aside = y * sin + z * cos;

@@ -8,9 +8,9 @@
 use std::sync::OnceLock;
 
 use horma_core::{
-    Body, Contact, Cutter, Digitizer, Direction, Discretization, Extent, Inserted, Job, Mesh,
-    Method, Motion, MotionKind, Part, Plan, Point, Row, Shape, Simd, SubTrajectory, Surface, Touch,
-    stitch,
+    Body, Contact, Coordinates, Cutter, Digitizer, Direction, Discretization, Extent, Inserted,
+    Job, Mesh, Method, Motion, MotionKind, Part, Plan, Point, Row, Shape, Simd, SubTrajectory,
+    Surface, Touch, stitch,
 };
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -39,10 +39,17 @@ impl Case {
         let size = size(&part);
         let cutter = cutter(&mut dice, size)?;
         let motion = motion(&mut dice, &part, &cutter);
+        let coordinates = [
+            Coordinates::Double,
+            Coordinates::Double,
+            Coordinates::Packed21,
+        ];
+        let coordinates = *dice.pick(&coordinates);
         let rows = 2 + dice.below(11) as u32;
         let columns = 2 + dice.below(25) as u32;
         let mut job = Job {
             discretization: Discretization::Grid { rows, columns },
+            coordinates,
             cutter,
             motion,
             contact: *dice.pick(&[Contact::Facet, Contact::Point]),

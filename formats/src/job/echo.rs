@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::machine::{LIMITS, Machine};
 use super::program::{ANGLES, FEED_MODES, POINTS, UNITS};
-use super::{CONTACTS, JobFile, KINDS, TRIMMED, last, passes};
+use super::{CONTACTS, COORDINATES, JobFile, KINDS, TRIMMED, last, passes};
 use crate::post::{Program, Split};
 
 impl JobFile {
@@ -16,12 +16,13 @@ impl JobFile {
             Axis::Principal => json!("auto"),
             Axis::Through { point, direction } => json!({ "point": point, "direction": direction }),
         };
-        let discretization = match self.job.discretization {
+        let mut discretization = match self.job.discretization {
             Discretization::Tolerance(tolerance) => json!({ "tolerance": tolerance }),
             Discretization::Grid { rows, columns } => {
                 json!({ "grid": { "rows": rows, "columns": columns } })
             }
         };
+        discretization["coordinates"] = json!(name_of(&COORDINATES, &self.job.coordinates));
         let motion = self.job.motion;
         let mut echo = json!({
             "part": {

@@ -99,6 +99,7 @@ pub(super) struct RawAxis {
 pub(super) struct RawDiscretization {
     pub(super) tolerance: Option<Given<f64>>,
     pub(super) grid: Option<Given<RawGrid>>,
+    pub(super) coordinates: Option<Given<String>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -333,6 +334,8 @@ impl RawJob {
             "extents_per_worker",
             &by.extents_per_worker,
         );
+        let coordinates = &mut self.discretization.coordinates;
+        put(coordinates, "coordinates", &by.coordinates);
         put(&mut self.digitizing.contact, "contact", &by.contact);
         put(&mut self.digitizing.method, "method", &by.method);
         put(&mut self.digitizing.delta_u, "delta_u", &by.delta_u);

@@ -357,6 +357,22 @@ fn flags_take_the_place_of_the_file() {
 }
 
 #[test]
+fn coordinates_are_doubles_or_packed_and_the_tolerance_has_room_for_them() {
+    let said = |c: &str| format!("tolerance = 0.02\ncoordinates = \"{c}\"");
+    let packed = valid(&JOB.replacen("tolerance = 0.02", &said("packed21"), 1));
+    assert_eq!(packed.job.coordinates, Coordinates::Packed21);
+    assert_eq!(packed.echo()["discretization"]["coordinates"], "packed21");
+    assert_eq!(valid(JOB).job.coordinates, Coordinates::Double);
+    assert_eq!(valid(JOB).echo()["discretization"]["coordinates"], "double");
+    let unknown = "unknown coordinates 'single'; known: double, packed21";
+    refused("tolerance = 0.02", &said("single"), unknown);
+    let fine = said("packed21").replacen("0.02", "0.0004", 1);
+    let refusal = "tolerance is 0.0004 mm, of which rounding to packed21 takes 0.000423";
+    refused("tolerance = 0.02", &fine, refusal);
+    refused("tolerance = 0.02", &fine, "10 | tolerance");
+}
+
+#[test]
 fn a_path_tolerance_is_positive_and_has_heights_between_positions() {
     let tolerance = |t: &str| format!("step = 2\npath_tolerance = {t}");
     let j = valid(&JOB.replacen("step = 2", &tolerance("0.005"), 1));

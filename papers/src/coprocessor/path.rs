@@ -4,8 +4,8 @@
 use std::cmp::Ordering;
 
 use horma_core::{
-    Contact, Cutter, Digitizer, Discretization, Job, Method, Motion, MotionKind, Outline, Packing,
-    Point, Simd, Trajectory, discretize, pack_words, unpack_words,
+    Contact, Coordinates, Cutter, Digitizer, Discretization, Job, Method, Motion, MotionKind,
+    Outline, Packing, Point, Simd, Trajectory, discretize, pack_words, unpack_words,
 };
 use horma_formats::sample::{self, LastStyle};
 
@@ -85,6 +85,7 @@ impl Sample {
             discretization: GRID,
             cutter,
             motion,
+            coordinates: Coordinates::Double,
             contact: Contact::Point,
             method: Method::Exact,
         };

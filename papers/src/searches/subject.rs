@@ -4,9 +4,9 @@ use std::ops::Range;
 use std::time::Instant;
 
 use horma_core::{
-    Contact, Counters, Culling, Cutter, Digitizer, Discretization, Heuristic, Job, Local, Method,
-    Motion, MotionKind, Part, Plan, Point, RowKind, Simd, ToolPath, Window, discretize, length,
-    sub,
+    Contact, Coordinates, Counters, Culling, Cutter, Digitizer, Discretization, Heuristic, Job,
+    Local, Method, Motion, MotionKind, Part, Plan, Point, RowKind, Simd, ToolPath, Window,
+    discretize, length, sub,
 };
 use horma_formats::sample::{self, LastStyle};
 
@@ -71,6 +71,7 @@ impl Subject {
                 path_tolerance: None,
                 lead: [0.0; 2],
             },
+            coordinates: Coordinates::Double,
             contact: Contact::Point,
             method: Method::Exact,
         };

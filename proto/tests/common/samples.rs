@@ -57,6 +57,7 @@ pub fn job() -> wire::Job {
         contact: wire::Contact::Facet.into(),
         method: wire::Method::Exact.into(),
         local: None,
+        packed21: true,
     }
 }
 
@@ -90,10 +91,20 @@ pub fn task(supply: wire::task::Supply) -> wire::Task {
 pub fn row(id: u32) -> wire::Row {
     wire::Row {
         id,
-        points: numbers(9).into(),
+        coordinates: Some(wire::row::Coordinates::Points(numbers(9).into())),
         kind: Some(wire::row::Kind::Slab(wire::Slab {
             facets: triangle().into(),
         })),
+    }
+}
+
+/// A row of a mesh, its points packed.
+pub fn packed_row(id: u32) -> wire::Row {
+    let words = [0_u64, 7, (1 << 42) - 1].into_iter();
+    let words = words.flat_map(u64::to_le_bytes).collect();
+    wire::Row {
+        coordinates: Some(wire::row::Coordinates::Packed21(words)),
+        ..row(id)
     }
 }
 
@@ -119,6 +130,7 @@ pub fn grid() -> wire::SurfaceGrid {
         us: vec![0.25, 1.0],
         vs: vec![0.0, 0.5, 1.0],
         last: 5,
+        packed21: true,
     }
 }
 
