@@ -2,6 +2,7 @@
 //! on any number of threads, and extent by extent, over parts meant to make it fail.
 
 mod common;
+mod packed;
 
 use common::Case;
 use horma_core::{
