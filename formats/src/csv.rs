@@ -150,10 +150,17 @@ const LARGE: f64 = 9_007_199_254_740_992.0;
 /// Reads a path: one that [`save`] wrote, or one from elsewhere in the same form.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read, [`Error::BadCsvLine`] for the first line that is not what
-/// [`write()`] writes.
+/// [`Error::Io`] if it cannot be read, and those of [`parse`].
 pub fn read(file: &Path) -> Result<Vec<Row>> {
     let text = std::fs::read_to_string(file).map_err(|source| Error::io(file, source))?;
+    parse(&text, file)
+}
+
+/// Parses the text of the path at `file`.
+///
+/// # Errors
+/// [`Error::BadCsvLine`] for the first line that is not what [`write()`] writes.
+pub fn parse(text: &str, file: &Path) -> Result<Vec<Row>> {
     let bad = |line: usize, expected, found: &str| Error::BadCsvLine {
         path: file.to_owned(),
         line,
@@ -167,7 +174,7 @@ pub fn read(file: &Path) -> Result<Vec<Row>> {
     }
     let mut rows = Vec::new();
     for (number, line) in lines {
-        let row = parse(line).ok_or_else(|| bad(number, SHAPE, line))?;
+        let row = row(line).ok_or_else(|| bad(number, SHAPE, line))?;
         if !follows(row.index, rows.last()) {
             return Err(bad(number, "an index that follows the line before", line));
         }
@@ -206,7 +213,7 @@ fn index_of(text: &str) -> Option<Index> {
 const SHAPE: &str = "an index, whole or with a fraction of 1024ths, and six numbers, of which y may be empty and the \
     last three too, but only together";
 
-fn parse(line: &str) -> Option<Row> {
+fn row(line: &str) -> Option<Row> {
     let (index, rest) = line.split_once(',')?;
     let mut fields = [""; 6];
     let mut found = rest.split(',');

@@ -1,4 +1,4 @@
-//! Parts of every format in `parts/`, made for these tests, and the same files spoilt.
+//! Parts of every format in `parts/`, a job and a path, made for these tests, and the same files spoilt.
 
 mod common;
 
