@@ -28,18 +28,20 @@ pub enum Scale {
     Even,
     /// Equal lengths for equal ratios; only positive values can be shown.
     Logarithmic,
+    /// Only upwards, beside an even axis: the lengths of that one, and a picture as high as it takes.
+    ToScale,
 }
 
 /// A curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Its name in the legend.
+    /// Its name in the legend, where one without a name is left out.
     pub name: String,
     /// Its colour, a number below [`COLORS`].
     pub color: usize,
     /// Whether the line is broken.
     pub dashed: bool,
-    /// Points, from left to right; with a mark at each if there are few.
+    /// Points, in order; with a mark at each if there are few, and a fine line if there are very many.
     pub points: Vec<[f64; 2]>,
 }
 
@@ -49,7 +51,16 @@ pub const COLORS: usize = 4;
 /// Most points of a curve that has a mark at each.
 const MARKED: usize = 40;
 
-/// Size of the picture, and the frame in it: left, top, right, bottom.
+/// Room above and below what is to scale, of its height, so that nothing runs along the frame.
+const ROOM: f64 = 0.04;
+
+/// Most points of a curve that is not fine.
+const BOLD: usize = 1000;
+
+/// How a fine line differs.
+const FINE: &str = " style=\"stroke-width:0.8\"";
+
+/// Size of the picture, and the frame in it: left, top, right, bottom; unless it is to scale.
 const SIZE: [f64; 2] = [720.0, 480.0];
 const FRAME: [f64; 4] = [72.0, 112.0, 696.0, 424.0];
 
@@ -64,11 +75,7 @@ const STYLE: &str = "\
 
 /// Draws a diagram.
 pub fn svg(plot: &Plot) -> String {
-    let [_, height] = SIZE;
     let [left, top, right, bottom] = FRAME;
-    let mut out = svg::begin(SIZE, &plot.title, STYLE);
-    text(&mut out, "title", "start", [left, 32.0], &plot.title);
-    text(&mut out, "minor", "start", [left, 53.0], &plot.subtitle);
     let values = |k: usize| {
         let scale = plot.scales[k];
         let points = plot.curves.iter().flat_map(|c| &c.points);
@@ -76,7 +83,15 @@ pub fn svg(plot: &Plot) -> String {
     };
     let [x_scale, y_scale] = plot.scales;
     let x = Axis::over(x_scale, values(0), [left, right]);
-    let y = Axis::over(y_scale, values(1), [bottom, top]);
+    let mut y = Axis::over(y_scale, values(1), [bottom, top]);
+    if y_scale == Scale::ToScale {
+        y.ends[0] = (top + (right - left) * y.length() / x.length()).round();
+    }
+    let below = y.ends[0] - bottom;
+    let (bottom, size) = (bottom + below, [SIZE[0], SIZE[1] + below]);
+    let mut out = svg::begin(size, &plot.title, STYLE);
+    text(&mut out, "title", "start", [left, 32.0], &plot.title);
+    text(&mut out, "minor", "start", [left, 53.0], &plot.subtitle);
     for (place, label) in &x.ticks {
         let at = x.at(*place);
         line(&mut out, "grid", [at, top], [at, bottom]);
@@ -87,9 +102,9 @@ pub fn svg(plot: &Plot) -> String {
         line(&mut out, "grid", [left, at], [right, at]);
         text(&mut out, "minor", "end", [left - 8.0, at + 4.5], label);
     }
-    svg::frame(&mut out, FRAME);
+    svg::frame(&mut out, [left, top, right, bottom]);
     let middle = [(left + right) / 2.0, (top + bottom) / 2.0];
-    text(&mut out, "", "middle", [middle[0], height - 14.0], &plot.x);
+    text(&mut out, "", "middle", [middle[0], size[1] - 14.0], &plot.x);
     push(
         &mut out,
         format_args!(
@@ -112,13 +127,13 @@ pub fn svg(plot: &Plot) -> String {
 impl Scale {
     /// Whether it can show a value.
     fn shows(self, value: f64) -> bool {
-        value.is_finite() && (self == Self::Even || value > 0.0)
+        value.is_finite() && (self != Self::Logarithmic || value > 0.0)
     }
 
     /// Where equal lengths are equal differences.
     fn place(self, value: f64) -> f64 {
         match self {
-            Self::Even => value,
+            Self::Even | Self::ToScale => value,
             Self::Logarithmic => value.log10(),
         }
     }
@@ -139,6 +154,11 @@ impl Axis {
         });
         match scale {
             Scale::Even => Self::even(span.unwrap_or((0.0, 1.0)), ends),
+            Scale::ToScale => {
+                let (low, high) = span.unwrap_or((0.0, 1.0));
+                let room = ROOM * (high - low);
+                Self::even((low - room, high + room), ends)
+            }
             Scale::Logarithmic => Self::logarithmic(span.unwrap_or((1.0, 10.0)), ends),
         }
     }
@@ -187,9 +207,13 @@ impl Axis {
         self.at(self.scale.place(value))
     }
 
+    /// From end to end of what is shown.
+    fn length(&self) -> f64 {
+        self.span[1] - self.span[0]
+    }
+
     fn at(&self, place: f64) -> f64 {
-        let [low, high] = self.span;
-        let share = (place - low) / (high - low);
+        let share = (place - self.span[0]) / self.length();
         self.ends[0] + (self.ends[1] - self.ends[0]) * share
     }
 }
@@ -234,9 +258,10 @@ fn power(exponent: i32) -> String {
 /// Two curves above each other, then the next two.
 fn legend(out: &mut String, plot: &Plot) {
     let [left, top, right, _] = FRAME;
-    let columns = plot.curves.len().div_ceil(2).max(1);
+    let named = plot.curves.iter().filter(|c| !c.name.is_empty());
+    let columns = named.clone().count().div_ceil(2).max(1);
     let pitch = ((right - left) / columns as f64).min(190.0);
-    for (k, curve) in plot.curves.iter().enumerate() {
+    for (k, curve) in named.enumerate() {
         let x = left + pitch * (k / 2) as f64;
         let y = top - 38.0 + 20.0 * (k % 2) as f64;
         draw(out, curve, &[[x, y], [x + 26.0, y]]);
@@ -247,11 +272,12 @@ fn legend(out: &mut String, plot: &Plot) {
 fn draw(out: &mut String, curve: &Curve, places: &[[f64; 2]]) {
     let color = curve.color % COLORS;
     let dashed = if curve.dashed { " dashed" } else { "" };
+    let fine = if places.len() > BOLD { FINE } else { "" };
     let line = places.iter().map(|[x, y]| format!("{x:.1},{y:.1}"));
     let line = line.collect::<Vec<_>>().join(" ");
     push(
         out,
-        format_args!("<polyline class=\"curve c{color}{dashed}\" points=\"{line}\"/>\n"),
+        format_args!("<polyline class=\"curve c{color}{dashed}\"{fine} points=\"{line}\"/>\n"),
     );
     if places.len() > MARKED {
         return;
@@ -305,6 +331,42 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_to_scale_is_as_high_as_it_takes() {
+        let [left, top, right, _] = FRAME;
+        for ratio in [0.5, 2.0] {
+            let corners = vec![[0.0, 0.0], [10.0, 10.0 * ratio]];
+            let drawn = plot([Scale::Even, Scale::ToScale], corners);
+            let high = (right - left) * ratio * (1.0 + 2.0 * ROOM);
+            let height = SIZE[1] - FRAME[3] + (top + high).round();
+            assert!(drawn.contains(&format!("height=\"{height}\"")), "{drawn}");
+            let room = high.round() * ROOM / (1.0 + 2.0 * ROOM);
+            let (low, high) = (top + high.round() - room, top + room);
+            let line = format!("{left:.1},{low:.1} {right:.1},{high:.1}");
+            assert!(drawn.contains(&line), "{drawn}");
+        }
+    }
+
+    #[test]
+    fn only_what_has_a_name_is_in_the_legend_and_many_points_are_fine() {
+        let curve = |name: &str, points| Curve {
+            name: name.to_owned(),
+            color: 0,
+            dashed: false,
+            points: vec![[1.0, 2.0]; points],
+        };
+        let drawn = svg(&Plot {
+            title: String::new(),
+            subtitle: String::new(),
+            x: String::new(),
+            y: String::new(),
+            scales: [Scale::Even; 2],
+            curves: vec![curve("", BOLD + 1), curve("named", BOLD)],
+        });
+        assert_eq!(drawn.matches("<polyline").count(), 3, "{drawn}");
+        assert_eq!(drawn.matches(FINE).count(), 1, "{drawn}");
+    }
+
+    #[test]
     fn decades_span_the_frame() {
         let [left, top, right, bottom] = FRAME;
         let drawn = plot(LOGARITHMIC, vec![[1.0e4, 0.1], [1.0e5, 1.0], [1.0e6, 10.0]]);
@@ -325,7 +387,7 @@ mod tests {
             vec![[10.0, 5.0]],
             vec![[0.0, -1.0], [1.0, f64::NAN]],
         ] {
-            for scales in [LOGARITHMIC, [Scale::Even; 2]] {
+            for scales in [LOGARITHMIC, [Scale::Even; 2], [Scale::Even, Scale::ToScale]] {
                 let drawn = plot(scales, points.clone());
                 assert!(!drawn.contains("NaN") && !drawn.contains("inf"), "{drawn}");
                 assert!(drawn.ends_with("</svg>\n"));
