@@ -18,9 +18,13 @@ pub mod precision;
 
 pub mod coprocessor;
 
+pub mod subject;
+
 pub mod searches;
 
 pub mod quality;
+
+pub mod comparator;
 
 pub mod report;
 
@@ -77,17 +81,20 @@ pub enum Experiment {
     Searches,
     /// What lasts measure as designed and as machined.
     Quality,
+    /// A Z-constant path beside the turned one.
+    Comparator,
 }
 
 impl Experiment {
     /// All of them, in the order in which they are told.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::MultiRotator,
         Self::Cordic,
         Self::Precision,
         Self::Coprocessor,
         Self::Searches,
         Self::Quality,
+        Self::Comparator,
     ];
 
     /// What it is called on the command line.
@@ -99,6 +106,7 @@ impl Experiment {
             Self::Coprocessor => "coprocessor",
             Self::Searches => "searches",
             Self::Quality => "quality",
+            Self::Comparator => "comparator",
         }
     }
 
@@ -114,6 +122,7 @@ impl Experiment {
             Self::Coprocessor => coprocessor::chapter(),
             Self::Searches => searches::chapter(),
             Self::Quality => quality::chapter(),
+            Self::Comparator => comparator::chapter(),
         }
     }
 }

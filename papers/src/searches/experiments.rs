@@ -5,7 +5,7 @@ use horma_core::{Counters, Culling, Method, Window};
 use crate::error::Result;
 use crate::report::{Block, Claim, Verdict, three};
 
-use super::subject::{Subject, Turning};
+use crate::subject::{Subject, Turning};
 
 /// δ in print.
 pub const WINDOW: Window = Window {

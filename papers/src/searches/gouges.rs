@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::report::{Block, Claim, Verdict, three};
 
 use super::experiments::RADII;
-use super::subject::{Subject, Turning};
+use crate::subject::{Subject, Turning};
 
 /// How the paths turn that are held against the surface, and how far samples of this are apart, mm.
 const TURNING: Turning = Turning {

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::report::{Block, Claim, Verdict, three};
 
 use super::experiments::RADII;
-use super::subject::{Subject, Turning};
+use crate::subject::{Subject, Turning};
 
 /// As many processors as there are at most.
 const MOST: u32 = 8;
