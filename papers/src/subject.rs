@@ -13,7 +13,7 @@ use horma_formats::sample::{self, LastStyle};
 use crate::error::Result;
 
 /// Memory that is more than enough, bytes.
-const MEMORY: u64 = 4 << 30;
+pub(crate) const MEMORY: u64 = 4 << 30;
 
 /// How a part turns beside the tool.
 #[derive(Debug, Clone, Copy, PartialEq)]

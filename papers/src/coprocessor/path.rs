@@ -5,11 +5,12 @@ use std::cmp::Ordering;
 
 use horma_core::{
     Contact, Coordinates, Cutter, Digitizer, Discretization, Job, Method, Motion, MotionKind,
-    Outline, Packing, Point, Simd, Trajectory, discretize, pack_words, unpack_words,
+    Packing, Plan, Point, Row, Simd, Trajectory, pack_words, unpack_words,
 };
 use horma_formats::sample::{self, LastStyle};
 
 use crate::error::Result;
+use crate::subject::MEMORY;
 
 use super::transform::{Transform, Unit, coordinates};
 
@@ -27,11 +28,13 @@ const POINTS_PER_REVOLUTION: u32 = 200;
 #[derive(Debug)]
 pub struct Sample {
     job: Job,
-    rows: Vec<horma_core::Row>,
+    rows: Vec<Row>,
     /// All points, mm.
     pub points: Vec<Point>,
     /// The same, packed, in the order of their x.
     packed: Vec<u64>,
+    /// The rows as they travel to workers if their coordinates are packed.
+    sent: Vec<Row>,
     /// All positions.
     pub trajectory: Trajectory,
 }
@@ -60,47 +63,56 @@ impl Sample {
     /// None, for the sample as it is.
     pub fn new() -> Result<Self> {
         let part = sample::last(&LastStyle::WOMEN)?;
-        let model = discretize(&part, GRID)?;
-        let cutter = Cutter::torus(MAJOR_RADIUS, MINOR_RADIUS)?;
-        let motion = Motion {
-            kind: MotionKind::Helix,
-            step: STEP,
-            points_per_revolution: POINTS_PER_REVOLUTION,
-            from: None,
-            to: None,
-            path_tolerance: None,
-            lead: [0.0; 2],
-        };
-        let trajectory = motion.over(Outline::span(&model.outlines), cutter.half_width())?;
-        let points: Vec<Point> = model
-            .rows
-            .iter()
-            .flat_map(|r| r.points.iter().copied())
-            .collect();
-        let packing = Packing::new(coordinates().fraction())?;
-        let packed = points.iter().map(|&p| packing.pack(p));
-        let mut packed: Vec<u64> = packed.collect::<horma_core::Result<_>>()?;
-        packed.sort_by_key(|&p| unpack_words(p)[0]);
         let job = Job {
             discretization: GRID,
-            cutter,
-            motion,
+            cutter: Cutter::torus(MAJOR_RADIUS, MINOR_RADIUS)?,
+            motion: Motion {
+                kind: MotionKind::Helix,
+                step: STEP,
+                points_per_revolution: POINTS_PER_REVOLUTION,
+                from: None,
+                to: None,
+                path_tolerance: None,
+                lead: [0.0; 2],
+            },
             coordinates: Coordinates::Double,
             contact: Contact::Point,
             method: Method::Exact,
         };
+        let plan = |coordinates| Plan::new(&part, Job { coordinates, ..job }, MEMORY);
+        let Plan {
+            model, trajectory, ..
+        } = plan(Coordinates::Double)?;
+        let rows = model.rows.iter();
+        let points: Vec<Point> = rows.flat_map(|r| r.points.iter().copied()).collect();
+        let packing = Packing::new(coordinates().fraction())?;
+        let packed = points.iter().map(|&p| packing.pack(p));
+        let mut packed: Vec<u64> = packed.collect::<horma_core::Result<_>>()?;
+        packed.sort_by_key(|&p| unpack_words(p)[0]);
         Ok(Self {
             job,
             rows: model.rows,
             points,
             packed,
+            sent: plan(Coordinates::Packed21)?.model.rows,
             trajectory,
         })
     }
 
     /// Heights in doubles, by horma's own search.
     pub fn exact(&self) -> Vec<Option<f64>> {
-        let digitizer = Digitizer::new(&self.job, &self.rows, Simd::best());
+        self.heights(&self.rows)
+    }
+
+    /// How far the heights of that search over packed rows are from those, mm, at most.
+    pub fn sent(&self) -> f64 {
+        let pairs = self.heights(&self.sent).into_iter().zip(self.exact());
+        let off = pairs.filter_map(|(sent, exact)| Some((sent? - exact?).abs()));
+        off.fold(0.0, f64::max)
+    }
+
+    fn heights(&self, rows: &[Row]) -> Vec<Option<f64>> {
+        let digitizer = Digitizer::new(&self.job, rows, Simd::best());
         let (path, _) = digitizer.path(&self.trajectory);
         path.touches.iter().map(|t| t.map(|t| t.height)).collect()
     }

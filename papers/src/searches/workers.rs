@@ -1,6 +1,8 @@
 //! Eq. (10), what each of p processors has to do, beside what extents hold.
 
-use horma_core::{Extent, Job, Method};
+use std::time::Instant;
+
+use horma_core::{Digitizer, Extent, Method, Plan, Row, Simd};
 use horma_formats::plot::{Curve, Plot, Scale};
 
 use crate::error::Result;
@@ -80,14 +82,60 @@ impl Shared {
     }
 }
 
-/// For 1 and more workers.
-fn shared() -> Result<Vec<Shared>> {
-    let mut subject = Subject::alone(GRID, TURNING, RADII)?;
-    subject.plan.job = Job {
-        method: Method::Brute,
-        ..subject.plan.job
+/// Workers that are timed.
+const TIMED: [u32; 3] = [2, 4, 8];
+
+/// How long the busiest of so many takes for its positions by brute force, s.
+fn seconds(subject: &Subject, workers: u32) -> f64 {
+    let Plan {
+        job,
+        model,
+        trajectory,
+        ..
+    } = &subject.plan;
+    let rows = |e: &Extent| -> Vec<Row> {
+        let ids = e.rows.iter();
+        ids.map(|&id| model.rows[id as usize].clone()).collect()
     };
-    Ok((1..=MOST).map(|p| Shared::new(&subject, p)).collect())
+    let extents = subject.plan.split(workers);
+    let all = extents.iter().map(|e| {
+        let digitizer = Digitizer::new(job, &rows(e), Simd::best());
+        let begin = Instant::now();
+        digitizer.run_chunks(trajectory, e.first..e.first + e.count, |_, _| true);
+        begin.elapsed().as_secs_f64()
+    });
+    all.fold(0.0, f64::max)
+}
+
+fn timed(subject: &Subject, shared: &[Shared]) -> Vec<Claim> {
+    let alone = seconds(subject, 1);
+    let claim = |p: u32| {
+        let of = &shared[p as usize - 1];
+        Claim::new(
+            format!("time alone over that of the busiest of {p}"),
+            "",
+            format!(
+                "{}; by evaluations {}, by eq. (10) {}",
+                three(alone / seconds(subject, p)),
+                three(of.speedup()),
+                three(of.printed())
+            ),
+            Verdict::Unsaid,
+        )
+    };
+    TIMED.into_iter().map(claim).collect()
+}
+
+/// For 1 and more workers.
+fn shared(subject: &Subject) -> Vec<Shared> {
+    (1..=MOST).map(|p| Shared::new(subject, p)).collect()
+}
+
+/// The last without holders, by brute force.
+fn subject() -> Result<Subject> {
+    let mut subject = Subject::alone(GRID, TURNING, RADII)?;
+    subject.plan.job.method = Method::Brute;
+    Ok(subject)
 }
 
 /// What there is to tell of eq. (10).
@@ -95,7 +143,8 @@ fn shared() -> Result<Vec<Shared>> {
 /// # Errors
 /// None, for the sample last.
 pub fn blocks() -> Result<Vec<Block>> {
-    let shared = shared()?;
+    let subject = subject()?;
+    let shared = shared(&subject);
     let rows = shared.iter().map(|s| {
         vec![
             s.workers.to_string(),
@@ -131,6 +180,7 @@ pub fn blocks() -> Result<Vec<Block>> {
         Block::table("The busiest of p workers", &heads, rows.collect()),
         Block::Figure("workers", plot(&shared)),
         Block::Claims(claims(&shared)),
+        Block::Timed(timed(&subject, &shared)),
         Block::text(
             "That p workers have more than p times less to do is brute force's own waste: alone it looks at all points \
              for every position, of which the tool reaches those within its width; the fewer a worker holds, the fewer it \
@@ -210,7 +260,7 @@ mod tests {
 
     #[test]
     fn a_worker_has_its_share_of_the_positions_and_a_halo() {
-        let shared = shared().expect("the sample");
+        let shared = shared(&subject().expect("the sample"));
         assert_eq!((shared[0].held, shared[0].halo), (shared[0].points, 0));
         assert_eq!(shared[0].own_positions, shared[0].positions);
         for pair in shared.windows(2) {
