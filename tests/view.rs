@@ -233,12 +233,14 @@ fn what_one_position_too_low_leaves_is_seen_on_the_map() {
     let look = |page: &Path| {
         open(&browser, page);
         browser.ask("document.querySelector('#show-wheel').click()");
-        browser.ask("choose('#colour', 'machined'); return picture()");
-        browser.ask(RED_ON_MAP)
+        let picture = browser.ask("choose('#colour', 'machined'); return picture()");
+        (browser.ask(RED_ON_MAP), number(&picture["red"]))
     };
-    let map = look(&good);
+    let (map, red) = look(&good);
     assert_eq!(map[0], 0, "nothing is gouged: {map}");
-    let map = look(&out.join("report.html"));
+    assert_eq!(red, 0.0);
+    let (map, red) = look(&out.join("report.html"));
+    assert!(red > 200.0, "no ring: {red}");
     assert!(number(&map[0]) > 20.0, "{map}");
     assert!((number(&map[1]) - x).abs() < 1.5, "{map} instead of {x} mm");
     let apart = (number(&map[2]) - angle + 180.0).rem_euclid(360.0) - 180.0;

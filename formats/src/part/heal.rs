@@ -37,23 +37,26 @@ pub fn heal(name: &str, mesh: &mut Mesh) -> Result<Vec<Warning>> {
         vertices,
     });
     let tolerance = CRACK.min(RELATIVE * size(&vertices));
-    let sides = edges(&triangles);
-    let near = near_places(&vertices, &sides, tolerance);
-    let cracks = join(&mut triangles, &near);
-    let collapsed = drop_collapsed(&mut triangles);
+    let (mut collapsed, mut twice, mut cracks) = (0, 0, 0);
+    // A facet that goes may leave an edge open where there is a crack.
+    let sides = loop {
+        collapsed += drop_collapsed(&mut triangles);
+        twice += drop_duplicates(&mut triangles);
+        let sides = edges(&triangles);
+        let joined = join(&mut triangles, &near_places(&vertices, &sides, tolerance));
+        if joined == 0 {
+            break sides;
+        }
+        cracks += joined;
+    };
     tell(collapsed, |name, facets| Warning::CollapsedFacets {
         name,
         facets,
     });
-    let twice = drop_duplicates(&mut triangles);
     tell(twice, |name, facets| Warning::DuplicateFacets {
         name,
         facets,
     });
-    let sides = match cracks + collapsed + twice {
-        0 => sides,
-        _ => edges(&triangles),
-    };
     let turned = orient(&vertices, &mut triangles, &sides);
     tell(turned.facets, |name, facets| Warning::FlippedFacets {
         name,

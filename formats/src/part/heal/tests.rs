@@ -144,6 +144,23 @@ fn cracks_are_closed_and_gaps_are_not() {
     assert_eq!((mesh.open_edges().len(), warnings.len()), (8, 0));
 }
 
+/// Both edges of the crack are open only once a facet that is there twice has gone.
+#[test]
+fn a_crack_beside_a_facet_that_is_there_twice_is_closed() {
+    let near = 1.0e-5;
+    let vertices = vec![
+        [0.0; 3],
+        [10.0, 0.0, 0.0],
+        [0.0, 10.0, 0.0],
+        [near, 0.0, 0.0],
+        [10.0, near, 0.0],
+        [0.0, -10.0, 0.0],
+    ];
+    let (mesh, warnings) = healed(vertices, vec![[0, 1, 2], [0, 1, 2], [4, 3, 5]]);
+    assert_eq!(mesh.triangles(), [[0, 1, 2], [1, 0, 3]]);
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+}
+
 #[test]
 fn what_is_there_twice_or_without_area_goes_once_it_is_covered() {
     let (vertices, good) = cube(0.0, 10.0);

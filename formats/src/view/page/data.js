@@ -45,6 +45,9 @@ const machined = contents.cells && {
   deviations: unpack("deviations", Float32Array),
 };
 
+/// The deepest gouge of the machined surface, if it is more than what is allowed or, if nothing is said, seen.
+const gouged = [report.machined?.deepest_gouge].find((spot) => spot && -spot.deviation > (report.machined.tolerance ?? 0.001));
+
 /// The path: a number of each kind for each position that is shown.
 const path = {
   index: unpack("index", Float64Array) ?? new Float64Array(),

@@ -40,7 +40,7 @@ function theme() {
     return getComputedStyle(probe).color;
   };
   const rgb = (name) => text(name).match(/\d+/g).slice(0, 3).map(Number);
-  const [plots, solids] = [["text", "faint", "edge", "accent", "bad"], ["part", "wheel", "line", "mark", "open"]];
+  const [plots, solids] = [["text", "faint", "edge", "accent", "bad"], ["part", "wheel", "line", "mark", "fault"]];
   const found = Object.fromEntries([...plots.map((n) => [n, text(n)]), ...solids.map((n) => [n, rgb(n)])]);
   probe.remove();
   return found;

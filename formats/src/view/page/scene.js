@@ -28,8 +28,10 @@ in vec3 facing;
 in vec4 colour;
 uniform vec4 paint;   // used instead of the colour where it is not transparent
 uniform bool lit;
+uniform bool ring;    // instead of a point
 out vec4 shown;
 void main() {
+  if (ring && abs(length(gl_PointCoord - 0.5) - 0.43) > 0.07) discard;
   vec4 base = paint.a > 0.0 ? paint : colour;
   if (base.a == 0.0) discard;
   float light = 1.0;
@@ -52,10 +54,11 @@ function scene(canvas) {
   const program = link(gl);
   const uniform = (name) => gl.getUniformLocation(program, name);
   const at = Object.fromEntries(
-    ["turn", "shift", "view", "centre", "zoom", "lift", "size", "paint", "lit"].map((n) => [n, uniform(n)]),
+    ["turn", "shift", "view", "centre", "zoom", "lift", "size", "paint", "lit", "ring"].map((n) => [n, uniform(n)]),
   );
   const solid = solidBuffers(gl, part);
   const edges = part.edges.length && figure(gl, gl.LINES, part.edges, Uint32Array.from({ length: part.edges.length / 3 }, (_, i) => i));
+  const spot = gouged && figure(gl, gl.POINTS, Float32Array.from(gouged.point), Uint32Array.of(0));
   const tool = !alone && solidBuffers(gl, wheel(contents.wheel));
   const order = strip();
   const lines = alone ? {} : { contacts: lineBuffers(gl, path.contacts, order), centres: lineBuffers(gl, centres(), order) };
@@ -127,6 +130,16 @@ function scene(canvas) {
         gl.disable(gl.BLEND);
       }
     }
+    if (spot && choice.on === "rays") {
+      // Seen through the part, so that it is not missed.
+      gl.disable(gl.DEPTH_TEST);
+      gl.uniform1i(at.ring, true);
+      set(false, 0, 34 * devicePixelRatio);
+      paint(theme.fault);
+      spot.draw();
+      gl.uniform1i(at.ring, false);
+      gl.enable(gl.DEPTH_TEST);
+    }
     for (const [name, line] of Object.entries(lines)) {
       if (!show[name] || (errors && name === "contacts")) continue;
       set(false, name === "contacts" ? LIFT : 0);
@@ -138,7 +151,7 @@ function scene(canvas) {
       // Through the part, so that none is missed.
       gl.disable(gl.DEPTH_TEST);
       set(false, 0);
-      paint(theme.open);
+      paint(theme.fault);
       edges.draw();
       gl.enable(gl.DEPTH_TEST);
     }

@@ -74,7 +74,7 @@ function machinedTable({ rays, compared, spacing, columns, deepest_gouge, larges
   const spot = (s) => (s ? `${mm(Math.abs(s.deviation), 4)} at ${fixed(s.x, 2)} mm, ${fixed(s.angle, 1)}°` : "none");
   const ranks = percentiles ? Object.entries(percentiles) : [];
   return table("The surface as machined", [], [
-    ["deepest below the designed surface", spot(deepest_gouge)],
+    [`deepest below the designed surface${gouged ? ", ringed in the picture" : ""}`, spot(deepest_gouge)],
     ["most above it", spot(largest_excess)],
     ...ranks.map(([name, value]) => [name === "median" ? "median" : `${name.slice(1)} % are not above`, mm(value, 4)]),
     ...(within_tolerance === null ? [] : [[`within ${rough(tolerance)} mm`, percent(within_tolerance)]]),
