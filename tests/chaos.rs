@@ -1,16 +1,12 @@
 //! Faults by chance, from seeds: each run starts a real cluster, lets one thing go wrong at some moment of
 //! a job, proves that it did, and compares the path to that of one process. A few seeds are run by
-//! default; `HORMA_CHAOS_SEEDS=0..200 cargo test --test chaos -- --nocapture` runs as many as wanted and
+//! default; `HORMA_CHAOS_SEEDS=0..200 cargo test chaos:: -- --nocapture` runs as many as wanted and
 //! prints a table.
 //!
 //! Faults of the network need hosts of their own: network namespaces, made by a script that lies beside
 //! the project on some machines, by root. Elsewhere they are skipped by name.
 
-mod common;
-
-#[path = "chaos/lab.rs"]
 mod lab;
-#[path = "chaos/proxy.rs"]
 mod proxy;
 
 use std::collections::BTreeMap;
@@ -18,7 +14,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use common::{Process, brute_job, horma, path_of, sample, scratch, text, wait_until};
+use crate::common::{Process, brute_job, horma, path_of, sample, scratch, text, wait_until};
 use fastrand::Rng;
 use lab::Lab;
 use proxy::Proxy;

@@ -1,10 +1,8 @@
 //! The command as its user meets it: what it answers to bad input, and with which exit code.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{job, master, report, run, sample, scratch, succeed, text, texts};
+use crate::common::{job, master, report, run, sample, scratch, succeed, text, texts};
 
 const GOOD: &str =
     "[cutter]\nkind = \"ball\"\nradius = 8.0\n[motion]\nstep = 20.0\npoints_per_revolution = 12\n";
@@ -353,7 +351,7 @@ fn variables_lie_between_flags_and_file() {
     );
     let out = dir.path().join("out");
     let step_with = |flags: &[&str]| {
-        let mut command = common::horma();
+        let mut command = crate::common::horma();
         command
             .args(["run", text(&job), "-o", text(&out), "-q"])
             .args(flags);
@@ -572,7 +570,7 @@ fn every_instruction_set_gives_the_same_bytes() {
     let dir = scratch();
     let part = sample().with_file_name("last.step");
     let job = job(dir.path(), "job.toml", &[&part], GOOD);
-    let path = |simd: &str| common::path_of(&job, dir.path(), simd, &["--simd", simd]);
+    let path = |simd: &str| crate::common::path_of(&job, dir.path(), simd, &["--simd", simd]);
     let scalar = path("scalar");
     for simd in horma_core::Simd::available() {
         assert!(path(&simd.to_string()) == scalar, "{simd}");

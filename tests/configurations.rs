@@ -1,11 +1,9 @@
 //! The three configurations that the 2001 paper measured, in full: every position by the exact search, by
 //! brute force and by the papers' windows.
 
-mod common;
-
 use std::path::Path;
 
-use common::{data, job, path_of, report, sample, scratch};
+use crate::common::{data, job, path_of, report, sample, scratch};
 
 /// Rows, columns, points per revolution and step.
 const CONFIGURATIONS: [(u32, u32, u32, f64); 3] = [

@@ -2,14 +2,12 @@
 //! something refers to what is there. Whether an engine then does it is for `tests/compose` and
 //! `tests/slurm`.
 
-mod common;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{scratch, succeed, text, texts};
+use crate::common::{scratch, succeed, text, texts};
 
 fn deploy() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy")
@@ -102,7 +100,7 @@ fn every_command_of_scripts_units_and_pages_parses() {
             let known = |w| if str::contains(w, '$') { "1" } else { w };
             let mut args: Vec<&str> = words.map(|w| known(w)).collect();
             args.push("--help");
-            let output = common::run(&args);
+            let output = crate::common::run(&args);
             assert!(
                 output.status.success(),
                 "{}: {command:?}\n{}",

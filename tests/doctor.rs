@@ -1,14 +1,12 @@
 //! `horma doctor`: a fit host, and every way in which one is not.
 
-mod common;
-
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use rcgen::{BasicConstraints, CertificateParams, IsCa, Issuer, KeyPair};
 
-use common::{master, run, scratch, succeed, text, texts};
+use crate::common::{master, run, scratch, succeed, text, texts};
 
 /// What was said about something, and the exit code.
 fn examined(args: &[&str]) -> (Option<i32>, String) {

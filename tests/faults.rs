@@ -1,16 +1,13 @@
 //! What goes wrong on a cluster costs time, never a byte, or the job fails and says why. Every test
 //! proves that its fault was there.
 
-mod common;
-#[path = "faults/halo.rs"]
 mod halo;
-#[path = "faults/slow.rs"]
 mod slow;
 
 use std::path::{Path, PathBuf};
 
-use common::{Process, brute_job, data, master, path_of, report, sample, scratch, text};
-use common::{wait_until, worker};
+use crate::common::{Process, brute_job, data, master, path_of, report, sample, scratch, text};
+use crate::common::{wait_until, worker};
 use horma_proto::wire::digitize_reply::Kind;
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::worker_server::{Worker, WorkerServer};

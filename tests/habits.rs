@@ -1,11 +1,9 @@
 //! What a run is besides a run: told beforehand, told to other programs, and repeated when a file changes;
 //! and the pages of its manual.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{Process, job, report, run, sample, scratch, succeed, text, texts, wait_until};
+use crate::common::{Process, job, report, run, sample, scratch, succeed, text, texts, wait_until};
 use serde_json::Value;
 
 /// A coarse job of the sample last, with its own copy of the part.

@@ -1,13 +1,11 @@
 //! Lasts in sizes and for both feet: the same bytes for any number of workers, all or nothing, and a path that is
 //! mirrored with its part.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{job, report, run, sample, scratch, succeed, text, texts};
+use crate::common::{job, report, run, sample, scratch, succeed, text, texts};
 
 /// The sample last with a coarse path.
 fn coarse(dir: &Path, more: &str) -> PathBuf {

@@ -1,10 +1,8 @@
 //! The machined surface: what a path does to a part is seen where it does it, and a good path shows nothing.
 
-mod common;
-
 use std::path::Path;
 
-use common::{job, lower, report, sample, scratch, succeed, text};
+use crate::common::{job, lower, report, sample, scratch, succeed, text};
 use serde_json::Value;
 
 fn number(value: &Value, pointer: &str) -> f64 {

@@ -1,12 +1,10 @@
 //! Paths against oracles that share no code with the product: other libraries, closed forms, and the
 //! interpreter that will run the program. `tests/run` sets them up; what is missing is skipped by name.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{data, job, path_of, sample, scratch, text};
+use crate::common::{data, job, path_of, sample, scratch, text};
 use horma_core::{Direction, Point, Surface};
 
 /// Asks an oracle; false if there is none here.
@@ -20,7 +18,7 @@ fn ask(script: &str, args: &[&str]) -> bool {
         .join(script);
     let output = Command::new(python).arg(&script).args(args).output();
     let output = output.expect("the oracles' Python starts");
-    let (out, err) = common::texts(&output);
+    let (out, err) = crate::common::texts(&output);
     assert!(
         output.status.success(),
         "{} {args:?}\n{out}{err}",
@@ -385,7 +383,7 @@ fn check_dialects(part: &Path, axis: &str) {
         let job = job(dir.path(), "job.toml", &[part], &more);
         path_of(&job, dir.path(), dialect, &[]);
         let out = dir.path().join(dialect);
-        let report = common::report(&out);
+        let report = crate::common::report(&out);
         let files = report["program"]["files"].as_array().expect("files");
         let files = files.iter().map(|f| out.join(f.as_str().expect("a name")));
         let files: Vec<PathBuf> = files.collect();
@@ -419,7 +417,7 @@ fn what_is_also_written_is_what_other_libraries_read() {
     \"designed.stl\", \"scene.glb\"]\n";
     let job = job(dir.path(), "job.toml", &[&part], more);
     let out = dir.path().join("out");
-    common::succeed(&[
+    crate::common::succeed(&[
         "run",
         text(&job),
         "-o",
@@ -432,7 +430,7 @@ fn what_is_also_written_is_what_other_libraries_read() {
     let also = |name: &str, args: &[&str]| {
         let again = dir.path().join(name);
         let all = [&["run", text(&job), "-o", text(&again), "-q"], args].concat();
-        common::succeed(&all);
+        crate::common::succeed(&all);
         again
     };
     // Files are the same bytes however many workers there are, and nothing is written that was not asked for.

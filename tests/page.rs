@@ -1,13 +1,9 @@
 //! The master's page in a real browser, during a real job. Where there is none this is skipped by name.
 
-#[path = "common/browser.rs"]
-mod browser;
-mod common;
-
 use std::path::Path;
 
-use browser::Browser;
-use common::{Process, get, http, master, sample, scratch, text, worker};
+use crate::common::browser::Browser;
+use crate::common::{Process, get, http, master, sample, scratch, text, worker};
 use serde_json::{Value, json};
 
 const ARROW_RIGHT: char = '\u{E014}';

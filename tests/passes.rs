@@ -1,12 +1,10 @@
 //! Roughing and keep-outs as their user meets them: files, the program, the report, and the same bytes
 //! whoever computes.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use common::{Process, master, report, run, sample, scratch, succeed, text, texts, worker};
+use crate::common::{Process, master, report, run, sample, scratch, succeed, text, texts, worker};
 
 const PASSES: &str = "
 [stock]
@@ -34,7 +32,7 @@ fn job(dir: &Path, name: &str, more: &str) -> PathBuf {
 [cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
 [motion]\nstep = 10.0\npoints_per_revolution = 72\n";
     let part = sample().with_file_name("last.step");
-    common::job(dir, name, &[&part], &format!("{motion}{more}"))
+    crate::common::job(dir, name, &[&part], &format!("{motion}{more}"))
 }
 
 /// Paths and programs of a directory.
@@ -295,7 +293,7 @@ fn leads_come_in_beside_the_part() {
 [motion]\nstep = 10.0\npoints_per_revolution = 36\n";
     let part = sample().with_file_name("last.step");
     let made = |name: &str, more: &str| {
-        let job = common::job(dir.path(), "job.toml", &[&part], &format!("{motion}{more}"));
+        let job = crate::common::job(dir.path(), "job.toml", &[&part], &format!("{motion}{more}"));
         let out = dir.path().join(name);
         succeed(&["run", text(&job), "-o", text(&out), "-q", "--no-verify"]);
         results(&out)

@@ -1,17 +1,15 @@
 //! The program as its user meets it: its files, what the machine allows, and what the report tells of it.
 
-mod common;
-
 use std::path::Path;
 
-use common::{report, run, sample, scratch, succeed, text, texts};
+use crate::common::{report, run, sample, scratch, succeed, text, texts};
 
 /// The sample, coarse, with these sections after its own.
 fn job(dir: &Path, more: &str) -> std::path::PathBuf {
     let motion = "[cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
 [motion]\nstep = 10.0\npoints_per_revolution = 72\n";
     let part = sample().with_file_name("last.step");
-    common::job(dir, "job.toml", &[&part], &format!("{motion}{more}"))
+    crate::common::job(dir, "job.toml", &[&part], &format!("{motion}{more}"))
 }
 
 fn names(dir: &Path) -> Vec<String> {

@@ -1,12 +1,10 @@
 //! The Python wheel: built, installed into a clean virtual environment, and tested there beside this binary.
 
-mod common;
-
 use std::ffi::OsStr;
 use std::path::Path;
 use std::process::Command;
 
-use common::{forget_settings, scratch, texts};
+use crate::common::{forget_settings, scratch, texts};
 
 /// Runs a program to a good end.
 fn succeed(program: &OsStr, args: &[&OsStr], set: &[(&str, &OsStr)]) -> String {

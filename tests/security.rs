@@ -1,13 +1,11 @@
 //! Who may take part: with certificates the same bytes as without, and everybody who cannot prove the
 //! right role is turned away and told why.
 
-mod common;
-#[path = "security/look.rs"]
 mod look;
 
 use std::path::{Path, PathBuf};
 
-use common::{
+use crate::common::{
     Process, horma, path_of, report, run, sample, scratch, succeed, text, texts, wait_until,
 };
 use horma_proto::tls::{Role, Tls};
@@ -70,13 +68,13 @@ impl Authority {
 
     fn master(&self) -> (Process, String) {
         let args = self.args("master");
-        common::master(&words(&args))
+        crate::common::master(&words(&args))
     }
 
     /// A worker, and the address at which it listens.
     fn worker(&self, master: &str, id: &str) -> (Process, String) {
         let args = self.args("worker");
-        let mut process = common::worker_with(master, id, &words(&args));
+        let mut process = crate::common::worker_with(master, id, &words(&args));
         let address = process.wait_for_word(&["listening on"]);
         (process, address)
     }
@@ -245,7 +243,7 @@ fn whoever_cannot_prove_the_right_role_is_refused_and_told_why() {
     assert!(told.contains("forbidden=2 malformed=0"), "{told}");
     assert!(!told.contains("connections=0"), "{told}");
 
-    let (_plain, address) = common::master(&[]);
+    let (_plain, address) = crate::common::master(&[]);
     let plain = "it does not speak TLS";
     check_worker(&address, &ours.args("worker"), 2, &[&address, plain]);
     check_submit(&address, &ours.args("client"), 2, &[&address, plain]);
@@ -331,7 +329,7 @@ async fn an_address_that_is_no_workers_costs_time_and_no_byte() {
     let dir = scratch();
     let authority = Authority::new(dir.path(), "certs");
     let alone = path_of(&sample(), dir.path(), "alone", &[]);
-    let (_plain, plain) = common::master(&[]);
+    let (_plain, plain) = crate::common::master(&[]);
     let (_master, master) = authority.master();
     let tls = authority.tls(Role::Worker);
     let mut client = MasterClient::new(dial(&master, Role::Master, &tls).await);

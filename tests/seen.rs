@@ -1,11 +1,11 @@
 //! What can be seen of a cluster from outside: metrics as they are documented, health, and who may look.
 
-mod common;
-
 use std::collections::BTreeMap;
 
-use common::{Process, horma};
-use common::{get, http, master, report, run, sample, scratch, succeed, text, texts, worker_with};
+use crate::common::{Process, horma};
+use crate::common::{
+    get, http, master, report, run, sample, scratch, succeed, text, texts, worker_with,
+};
 use horma_proto::tls::Role;
 use horma_proto::transport::{connect, endpoint};
 use serde_json::Value;

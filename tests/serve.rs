@@ -1,11 +1,9 @@
 //! A master that serves: jobs are sent, looked at, cancelled and fetched; and a master that is killed
 //! at any instant and started again has forgotten nothing.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{
+use crate::common::{
     Process, master, path_of, report, run, sample, scratch, succeed, text, texts, worker,
 };
 use horma_proto::wire::master_client::MasterClient;
@@ -17,7 +15,7 @@ use tonic::{Code, Status};
 /// A job of seconds on one worker, in as many extents as there are workers.
 fn long_job(dir: &Path) -> PathBuf {
     let part = sample().with_file_name("last.step");
-    common::brute_job(dir, "long.toml", &part, "point", [159, 120])
+    crate::common::brute_job(dir, "long.toml", &part, "point", [159, 120])
 }
 
 /// A job of a moment.
@@ -27,7 +25,7 @@ fn short_job(dir: &Path) -> PathBuf {
 [discretization]\ngrid = { rows = 40, columns = 30 }
 [cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
 [motion]\nstep = 10.0\npoints_per_revolution = 30\n";
-    common::job(dir, "short.toml", &[&part], more)
+    crate::common::job(dir, "short.toml", &[&part], more)
 }
 
 /// Sends a job and does not wait; returns its number.
@@ -215,7 +213,7 @@ fn what_takes_too_long_is_left_to_the_store_and_a_second_signal_waits_for_nothin
 fn a_worker_whose_master_goes_for_good_in_the_middle_of_a_job_says_so() {
     let dir = scratch();
     let (first, address) = master(&["--lease", "1"]);
-    let mut worker = common::worker_with(&address, "w", &["--patience", "1"]);
+    let mut worker = crate::common::worker_with(&address, "w", &["--patience", "1"]);
     detach(&long_job(dir.path()), &address, &[]);
     worker.wait_for(&["going on", "jobs=[1]"]);
     drop(first);
@@ -232,7 +230,7 @@ fn a_small_job_is_done_in_the_middle_of_a_big_one() {
     let (_master, address) = master(&[]);
     let mut worker = worker(&address, "w");
     // These make it several extents, and do none of them.
-    let others = ["a", "b", "c", "d", "e"].map(|id| common::worker(&address, id));
+    let others = ["a", "b", "c", "d", "e"].map(|id| crate::common::worker(&address, id));
     others.iter().for_each(|other| other.signal("-STOP"));
     let big = detach(&long, &address, &["--points-per-revolution", "900"]);
     worker.wait_for(&["positions", "first="]);

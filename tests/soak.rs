@@ -3,13 +3,11 @@
 //! and the master's memory does not grow. Too long for every day:
 //!
 //! ```sh
-//! SOAK_MINUTES=60 SOAK_CLIENTS=50 cargo test --release --test soak -- --ignored --nocapture
+//! SOAK_MINUTES=60 SOAK_CLIENTS=50 cargo test --release soak:: -- --ignored --nocapture
 //! ```
 //!
 //! `SOAK_SEED` makes another run, `SOAK_LIFE` is how long the master lives between two kills, in seconds,
 //! and 0 lets it live.
-
-mod common;
 
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -19,7 +17,7 @@ use std::time::{Duration, Instant};
 
 use fastrand::Rng;
 
-use common::{Process, horma, master, path_of, sample, scratch, succeed, text, texts};
+use crate::common::{Process, horma, master, path_of, sample, scratch, succeed, text, texts};
 
 /// How long a client looks for a master that is just being started again, and for its path.
 const PATIENCE: &str = "300";
@@ -129,7 +127,7 @@ fn jobs(dir: &Path) -> Vec<(PathBuf, Vec<u8>, &'static str)> {
 [motion]\nstep = 4.0\npoints_per_revolution = 60
 [digitizing]\ncontact = \"point\"\nmethod = \"{method}\"\n"
         );
-        let file = common::job(dir, &format!("{rows}.toml"), &[&part], &more);
+        let file = crate::common::job(dir, &format!("{rows}.toml"), &[&part], &more);
         let path = path_of(&file, dir, "alone", &["--method", "exact"]);
         (file, path, distribution)
     };

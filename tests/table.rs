@@ -1,14 +1,12 @@
 //! The table of the distributions: each of them, on 1 to 16 workers, over points and over facets, of
 //! surfaces and of a scan, against the path of one process, byte for byte.
 //!
-//! `cargo test --test table -- --nocapture` prints it. The cutter is wider than the extents of many
+//! `cargo test table:: -- --nocapture` prints it. The cutter is wider than the extents of many
 //! workers, so that halos reach beyond neighbours.
-
-mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{data, job, path_of, report, run, sample, scratch, text, texts};
+use crate::common::{data, job, path_of, report, run, sample, scratch, text, texts};
 use horma_core::{Axis, Discretization, discretize, place};
 use horma_formats::part;
 use serde_json::Value;

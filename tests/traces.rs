@@ -1,14 +1,12 @@
 //! Traces: what a collector gets of a job, from every process that had a part in it; and that nobody waits
 //! for a collector.
 
-mod common;
-
 use std::collections::BTreeSet;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use common::{horma, master, path_of, run, sample, scratch, succeed, text};
-use common::{texts, worker_with};
+use crate::common::{horma, master, path_of, run, sample, scratch, succeed, text};
+use crate::common::{texts, worker_with};
 use opentelemetry_proto::tonic::collector::trace::v1::trace_service_server::{
     TraceService, TraceServiceServer,
 };
@@ -298,7 +296,7 @@ fn workers_of_a_local_run_send_what_they_have_before_they_end() {
 fn an_attempt_that_is_lost_is_told_as_failed() {
     let (collector, _runtime, url) = Collector::listen();
     let dir = scratch();
-    let job = common::brute_job(
+    let job = crate::common::brute_job(
         dir.path(),
         "job.toml",
         &sample().with_file_name("last.step"),

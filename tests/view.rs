@@ -1,13 +1,9 @@
 //! A run's page in a real browser, from disk. Where there is none this is skipped by name.
 
-#[path = "common/browser.rs"]
-mod browser;
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use browser::Browser;
-use common::{job, lower, sample, scratch, succeed, text};
+use crate::common::browser::Browser;
+use crate::common::{job, lower, sample, scratch, succeed, text};
 use serde_json::{Value, json};
 
 const ARROW_RIGHT: char = '\u{E014}';

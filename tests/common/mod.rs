@@ -3,6 +3,8 @@
 
 #![allow(dead_code)] // Each test binary uses its part of this.
 
+pub mod browser;
+
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};

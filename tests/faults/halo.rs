@@ -65,8 +65,8 @@ impl Worker for Keeper {
             Answer::Wrong => {
                 let row = wire::Row {
                     id: 1_000_000,
+                    coordinates: Some(wire::row::Coordinates::Points(Vec::new().into())),
                     kind: Some(wire::row::Kind::Isoline(wire::Isoline::default())),
-                    ..wire::Row::default()
                 };
                 let mut chunks = horma_proto::Chunks::of(std::iter::once(row));
                 chunks.next().expect("a chunk")
@@ -107,7 +107,7 @@ fn wide_job(dir: &Path) -> PathBuf {
 [cutter]\nkind = \"cylinder\"\nradius = 40.0\nwidth = 1000.0
 [motion]\nstep = 5.0\npoints_per_revolution = 60\nfrom = 20.0\nto = 250.0
 [cluster]\ndistribution = \"halo\"\n";
-    common::job(dir, "wide.toml", &[&part], more)
+    crate::common::job(dir, "wide.toml", &[&part], more)
 }
 
 /// The reasons of the attempts that were lost, each with who made it.

@@ -6,7 +6,7 @@ use super::*;
 
 /// A master that never takes a silent worker for lost, and tells when positions come.
 fn patient_master() -> (Process, String) {
-    common::master_saying("info,horma_master=debug", &["--lease", "600"])
+    crate::common::master_saying("info,horma_master=debug", &["--lease", "600"])
 }
 
 /// How many positions each worker brought of each extent.

@@ -15,8 +15,8 @@ use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_client::HealthClient;
 
+use super::{Authority, dial, words};
 use crate::common::{self, scratch};
-use crate::{Authority, dial, words};
 
 /// What a GET over TLS gets, from whoever has these files of its own.
 async fn get(address: &str, trusted: &Authority, own: Option<(&Authority, Role)>) -> String {
