@@ -49,7 +49,7 @@ fn words(line: &str) -> Vec<String> {
 }
 
 const WHEEL: &str = "[cutter]\nkind = \"torus\"\nmajor_radius = 40.0\nminor_radius = 8.0
-[motion]\nstep = 2.0\npoints_per_revolution = 360\n";
+[motion]\nstep = 2.0\npoints_per_revolution = 120\n";
 
 const AXIS: &str = "axis = { point = [0, 0, 14], direction = [1, 0, 0] }\n";
 
