@@ -264,7 +264,7 @@ fn workers_of_a_local_run_send_what_they_have_before_they_end() {
     let (collector, _runtime, url) = Collector::listen();
     let (dir, sample) = (scratch(), sample());
     let here = path_of(&sample, dir.path(), "here", &[]);
-    for (way, made) in [("overlap", 0), ("surface", 2)] {
+    for way in ["overlap", "surface"] {
         collector.spans().clear();
         let args = ["--workers", "2", "--distribution", way, "--otlp", &url];
         assert!(
@@ -281,6 +281,7 @@ fn workers_of_a_local_run_send_what_they_have_before_they_end() {
         assert_eq!(instances.len(), 2, "{tasks:#?}");
         parents(&tasks, &collector.named("extent"));
         let rows = collector.named("make rows");
+        let made = if way == "surface" { tasks.len() } else { 0 };
         assert_eq!(rows.len(), made, "{way}");
         parents(&rows, &tasks);
         assert!(

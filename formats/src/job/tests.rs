@@ -369,7 +369,7 @@ fn coordinates_are_doubles_or_packed_and_the_tolerance_has_room_for_them() {
     let fine = said("packed21").replacen("0.02", "0.0004", 1);
     let refusal = "tolerance is 0.0004 mm, of which rounding to packed21 takes 0.000423";
     refused("tolerance = 0.02", &fine, refusal);
-    refused("tolerance = 0.02", &fine, "10 | tolerance");
+    refused("tolerance = 0.02", &fine, "5 | tolerance");
 }
 
 #[test]
