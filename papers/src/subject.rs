@@ -13,7 +13,7 @@ use horma_formats::sample::{self, LastStyle};
 use crate::error::Result;
 
 /// Memory that is more than enough, bytes.
-pub(crate) const MEMORY: u64 = 4 << 30;
+const MEMORY: u64 = 4 << 30;
 
 /// How a part turns beside the tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,6 +76,20 @@ impl Subject {
             method: Method::Exact,
         };
         let plan = Plan::over(discretize(&part, discretization)?, job, MEMORY)?;
+        Ok(Self { part, plan })
+    }
+
+    /// The same with packed coordinates.
+    ///
+    /// # Errors
+    /// Those of [`Plan::new`], for a part that is larger than the sample.
+    pub fn packed(&self) -> Result<Self> {
+        let job = Job {
+            coordinates: Coordinates::Packed21,
+            ..self.plan.job
+        };
+        let part = self.part.clone();
+        let plan = Plan::new(&part, job, MEMORY)?;
         Ok(Self { part, plan })
     }
 

@@ -39,7 +39,7 @@ pub fn chapter() -> Result<Chapter> {
              positions to a millimetre as in print, {} positions; paths in doubles by horma's exact search over \
              the same points.",
             sample.points.len(),
-            sample.trajectory.positions
+            sample.trajectory().positions
         )),
         Block::Claims(precision(&sample, &compared)?),
         Block::text(
@@ -98,7 +98,7 @@ fn representation(points: &[Point]) -> Result<[f64; 2]> {
 fn precision(sample: &Sample, compared: &Compared) -> Result<Vec<Claim>> {
     let [truncated, rounded] = representation(&sample.points)?;
     let ulp = coordinates().ulp();
-    let (cycles, _) = sample.clocked(sample.trajectory.positions / 2);
+    let (cycles, _) = sample.clocked(sample.trajectory().positions / 2);
     let points = sample.points.len() as u64;
     Ok(vec![
         Claim::new(
@@ -142,7 +142,7 @@ fn precision(sample: &Sample, compared: &Compared) -> Result<Vec<Claim>> {
                 "8 bytes instead of 24; the surface is {} mm off at most, and heights over these points, \
                  searched in doubles, {}",
                 three(Coordinates::Packed21.error()),
-                three(sample.sent())
+                three(compared.sent)
             ),
             Verdict::Agrees,
         ),
@@ -208,7 +208,7 @@ fn speedups(sample: &Sample, compared: &Compared) -> Vec<Claim> {
     let hidden = fit.megacycles / PRINTED[1].0;
     let room = hidden / (DISTANCES * ALONE);
     let area = mean_area(sample, compared);
-    let cycles = (sample.points.len() as u64 + STAGES - 1) * sample.trajectory.positions;
+    let cycles = (sample.points.len() as u64 + STAGES - 1) * sample.trajectory().positions;
     vec![
         Claim::new("speed-up at 16 MHz", "2.6", three(slow), Verdict::Fitted),
         Claim::new("speed-up at 33 MHz", "4.1", three(fast), Verdict::Fitted),

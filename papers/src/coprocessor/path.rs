@@ -3,40 +3,32 @@
 
 use std::cmp::Ordering;
 
-use horma_core::{
-    Contact, Coordinates, Cutter, Digitizer, Discretization, Job, Method, Motion, MotionKind,
-    Packing, Plan, Point, Row, Simd, Trajectory, pack_words, unpack_words,
-};
-use horma_formats::sample::{self, LastStyle};
+use horma_core::{Method, Packing, Point, Trajectory, pack_words, unpack_words};
 
 use crate::error::Result;
-use crate::subject::MEMORY;
+use crate::subject::{Subject, Turning};
 
 use super::transform::{Transform, Unit, coordinates};
 
 /// The papers' grid for each surface, their torus, and 100 positions to a millimetre.
-const GRID: Discretization = Discretization::Grid {
-    rows: 130,
-    columns: 120,
-};
+const GRID: [u32; 2] = [130, 120];
 const MAJOR_RADIUS: f64 = 40.0;
 const MINOR_RADIUS: f64 = 8.0;
-const STEP: f64 = 2.0;
-const POINTS_PER_REVOLUTION: u32 = 200;
+const TURNING: Turning = Turning {
+    points_per_revolution: 200,
+    step: 2.0,
+};
 
 /// The sample last and its holders, as the coprocessor and as horma have it.
 #[derive(Debug)]
 pub struct Sample {
-    job: Job,
-    rows: Vec<Row>,
+    subject: Subject,
+    /// The same as it travels to workers if its coordinates are packed.
+    sent: Subject,
     /// All points, mm.
     pub points: Vec<Point>,
     /// The same, packed, in the order of their x.
     packed: Vec<u64>,
-    /// The rows as they travel to workers if their coordinates are packed.
-    sent: Vec<Row>,
-    /// All positions.
-    pub trajectory: Trajectory,
 }
 
 /// How the coprocessor's path compares with the one in doubles; mm.
@@ -52,6 +44,8 @@ pub struct Compared {
     pub largest: f64,
     /// On average.
     pub mean: f64,
+    /// How far heights of the exact search over packed points are from those in doubles at most.
+    pub sent: f64,
     /// Points in the tool's influence area at each position.
     pub areas: Vec<usize>,
 }
@@ -62,69 +56,39 @@ impl Sample {
     /// # Errors
     /// None, for the sample as it is.
     pub fn new() -> Result<Self> {
-        let part = sample::last(&LastStyle::WOMEN)?;
-        let job = Job {
-            discretization: GRID,
-            cutter: Cutter::torus(MAJOR_RADIUS, MINOR_RADIUS)?,
-            motion: Motion {
-                kind: MotionKind::Helix,
-                step: STEP,
-                points_per_revolution: POINTS_PER_REVOLUTION,
-                from: None,
-                to: None,
-                path_tolerance: None,
-                lead: [0.0; 2],
-            },
-            coordinates: Coordinates::Double,
-            contact: Contact::Point,
-            method: Method::Exact,
-        };
-        let plan = |coordinates| Plan::new(&part, Job { coordinates, ..job }, MEMORY);
-        let Plan {
-            model, trajectory, ..
-        } = plan(Coordinates::Double)?;
-        let rows = model.rows.iter();
+        let subject = Subject::new(GRID, TURNING, [MAJOR_RADIUS, MINOR_RADIUS])?;
+        let rows = subject.plan.model.rows.iter();
         let points: Vec<Point> = rows.flat_map(|r| r.points.iter().copied()).collect();
         let packing = Packing::new(coordinates().fraction())?;
         let packed = points.iter().map(|&p| packing.pack(p));
         let mut packed: Vec<u64> = packed.collect::<horma_core::Result<_>>()?;
         packed.sort_by_key(|&p| unpack_words(p)[0]);
         Ok(Self {
-            job,
-            rows: model.rows,
+            sent: subject.packed()?,
+            subject,
             points,
             packed,
-            sent: plan(Coordinates::Packed21)?.model.rows,
-            trajectory,
         })
+    }
+
+    /// All positions.
+    pub fn trajectory(&self) -> Trajectory {
+        self.subject.plan.trajectory
     }
 
     /// Heights in doubles, by horma's own search.
     pub fn exact(&self) -> Vec<Option<f64>> {
-        self.heights(&self.rows)
-    }
-
-    /// How far the heights of that search over packed rows are from those, mm, at most.
-    pub fn sent(&self) -> f64 {
-        let pairs = self.heights(&self.sent).into_iter().zip(self.exact());
-        let off = pairs.filter_map(|(sent, exact)| Some((sent? - exact?).abs()));
-        off.fold(0.0, f64::max)
-    }
-
-    fn heights(&self, rows: &[Row]) -> Vec<Option<f64>> {
-        let digitizer = Digitizer::new(&self.job, rows, Simd::best());
-        let (path, _) = digitizer.path(&self.trajectory);
-        path.touches.iter().map(|t| t.map(|t| t.height)).collect()
+        heights(&self.subject)
     }
 
     /// What the unit does at a position.
     pub fn transform(&self, position: u64) -> Transform {
-        let (travel, degrees) = (self.trajectory.travel(position), self.turned(position));
-        Transform::new(travel, degrees, self.job.cutter.half_width())
+        let (travel, degrees) = (self.trajectory().travel(position), self.turned(position));
+        Transform::new(travel, degrees, self.subject.plan.job.cutter.half_width())
     }
 
     fn turned(&self, position: u64) -> f64 {
-        let revolution = u64::from(POINTS_PER_REVOLUTION);
+        let revolution = u64::from(TURNING.points_per_revolution);
         360.0 * (position % revolution) as f64 / revolution as f64
     }
 
@@ -158,9 +122,14 @@ impl Sample {
             same: 0,
             largest: 0.0,
             mean: 0.0,
+            sent: 0.0,
             areas: Vec::new(),
         };
-        for (position, exact) in (0..).zip(self.exact()) {
+        let pairs = self.exact().into_iter().zip(heights(&self.sent));
+        for (position, (exact, sent)) in (0..).zip(pairs) {
+            if let Some((exact, sent)) = exact.zip(sent) {
+                compared.sent = compared.sent.max((sent - exact).abs());
+            }
             let (height, area) = self.height(position);
             compared.areas.push(area);
             match (height, exact) {
@@ -187,6 +156,12 @@ impl Sample {
     }
 }
 
+/// Heights by horma's exact search.
+fn heights(subject: &Subject) -> Vec<Option<f64>> {
+    let (path, _) = subject.path(Method::Exact);
+    path.touches.iter().map(|t| t.map(|t| t.height)).collect()
+}
+
 /// Eq. (1) as a height: where the tool's centre stands when it touches a point seen from it.
 fn distance([x, y, z]: Point) -> Option<f64> {
     let across = MINOR_RADIUS * MINOR_RADIUS - x * x;
@@ -205,7 +180,7 @@ mod tests {
     #[test]
     fn the_unit_stores_the_influence_area_and_no_more() {
         let sample = Sample::new().expect("the sample");
-        for position in [0, 777, 20_000, sample.trajectory.positions - 1] {
+        for position in [0, 777, 20_000, sample.trajectory().positions - 1] {
             let transform = sample.transform(position);
             let (cycles, stored) = sample.clocked(position);
             assert_eq!(cycles, sample.points.len() as u64 + 4);
