@@ -156,6 +156,19 @@ impl Cutter {
         }
     }
 
+    /// How much the height over a wheel's axis bends down across it, everywhere and at least, 1/mm: along
+    /// any way over the profile it lies below its tangent by half of this times the square of the way's
+    /// part across the axis.
+    pub fn least_bend(&self) -> f64 {
+        match *self {
+            // √(m² − z²) bends by m²/(m² − z²)^(3/2), which is 1/m at least; m bends by 1/r at least, so
+            // that nothing is lost where the way goes along the axis as well.
+            Self::Torus { .. } => 1.0 / self.max_radius(),
+            // Level along its rulings.
+            Self::Cone { .. } => 0.0,
+        }
+    }
+
     /// The largest radius at axial distances in `over`, mm, or `None` if they are all beyond the width.
     pub fn largest(&self, over: Interval) -> Option<f64> {
         let w = self.half_width();

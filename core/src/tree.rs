@@ -132,11 +132,13 @@ impl<L: Leaf> Tree<L> {
         best: &mut [Best; LANES],
         counters: &mut Counters,
     ) {
-        let Some(first) = starts.first().filter(|_| !self.nodes.is_empty()) else {
+        // The others are closest to the one in the middle.
+        let from = starts.len() / 2;
+        let Some(middle) = starts.get(from).filter(|_| !self.nodes.is_empty()) else {
             return;
         };
-        let mut views = [View::new(&self.frame, cutter, &first.pose); LANES];
-        let mut tops = [Top::new::<L>(cutter, first, 0.0); LANES];
+        let mut views = [View::new(&self.frame, cutter, &middle.pose); LANES];
+        let mut tops = [Top::new::<L>(cutter, middle, 0.0); LANES];
         let mut heights = [f32::INFINITY; LANES];
         for lane in lanes(active) {
             let start = &starts[lane];
@@ -144,7 +146,7 @@ impl<L: Leaf> Tree<L> {
             tops[lane] = Top::new::<L>(cutter, start, best[lane].height);
             heights[lane] = tops[lane].height;
         }
-        let swing = Swing::new(starts.iter().map(|start| start.pose));
+        let swing = Swing::new(&middle.pose, starts.iter().map(|start| start.pose));
         let mut open = Stack::new();
         open.push([f32::INFINITY; LANES], INNER);
         // Equal heights are still looked at: a lower number may be among them.
@@ -175,8 +177,8 @@ impl<L: Leaf> Tree<L> {
             if over_nodes && alive.count_ones() > 1 {
                 // What one position's view loses for the others is little beside a large lid's slack.
                 counters.nodes += 1;
-                let (view, place) = (&views[0], tops[0].place);
-                let all = swung_lid_bounds(simd, cutter, view, &swing, place, &node.lids);
+                let place = tops[from].place;
+                let all = swung_lid_bounds(simd, cutter, &views, from, &swing, place, &node.lids);
                 for lane in lanes(alive) {
                     high |= all[lane].simd_ge(heights[lane]).to_bitmask();
                     bounds[lane] = *all[lane];

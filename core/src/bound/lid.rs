@@ -167,69 +167,58 @@ pub(crate) fn lid_bounds<S: Simd>(
     )
 }
 
-/// How up to eight positions differ from the first of them.
+/// How far up to eight positions are from one of them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Swing {
-    /// Of the angle between them the sine, 1 less the cosine and the chord, and the travel, mm.
-    by: [[f32; 4]; LANES],
-    /// The longest chord and the longest travel.
+    /// The longest chord of the angles between them, and the longest travel, mm.
     most: [f32; 2],
 }
 
 impl Swing {
     /// Of these poses.
     #[inline(always)]
-    pub fn new(poses: impl Iterator<Item = Pose> + Clone) -> Self {
-        let mut swing = Self {
-            by: [[0.0; 4]; LANES],
-            most: [0.0; 2],
-        };
-        let Some(from) = poses.clone().next() else {
-            return swing;
-        };
-        for (by, to) in swing.by.iter_mut().zip(poses) {
-            let sin = to.sin * from.cos - to.cos * from.sin;
+    pub fn new(from: &Pose, poses: impl Iterator<Item = Pose>) -> Self {
+        let mut most = [0.0_f64; 2];
+        for to in poses {
             let (c, s) = (to.cos - from.cos, to.sin - from.sin);
-            let square = c * c + s * s;
-            let travel = to.x - from.x;
-            *by = [sin, 0.5 * square, square.sqrt(), travel].map(|n| n as f32);
-            swing.most = [swing.most[0].max(by[2]), swing.most[1].max(by[3].abs())];
+            most[0] = most[0].max(c * c + s * s);
+            most[1] = most[1].max((to.x - from.x).abs());
         }
-        swing
+        Self {
+            most: [most[0].sqrt() as f32, most[1] as f32],
+        }
     }
 }
 
-/// Upper bounds of F under lids for each of several positions, from what the first of them sees: its
-/// tangent planes are as good for the others, to which the lids are turned.
+/// Upper bounds of F under lids for each of several positions, by the tangent planes of one of them: each
+/// sees the lids turned over the same planes, which F falls below where they have moved away.
 #[inline(always)]
 pub(crate) fn swung_lid_bounds<S: Simd>(
     simd: S,
     cutter: &Cutter,
-    view: &View,
+    views: &[View; LANES],
+    from: usize,
     swing: &Swing,
     place: [f32; 2],
     lids: &Lids,
 ) -> [f32x8<S>; LANES] {
-    let under = Under::new(simd, cutter, view, place, lids);
+    let under = Under::new(simd, cutter, &views[from], place, lids);
     let [_, y, z] = under.middle;
     let [chord, travel] = swing.most;
     let radius = under.radius + (y.abs() + z.abs()) * chord;
     let circle = under.circle(radius);
     let near = under.near(radius, z, travel);
-    let Slopes { by_d, by_z, .. } = under.slopes;
-    // Turned by δ, a middle rises over its plane by sin δ·forth − (1 − cos δ)·back, and whatever is about
-    // it by a chord of δ times its radius more, at most.
-    let forth = by_z * y - z;
-    let back = by_z * z + y;
-    let about = (by_z.abs() + 1.0) * under.radius;
+    let bend = 0.5 * cutter.least_bend() as f32;
+    let middle = load(simd, &lids.middle);
     let nothing = f32x8::splat(simd, f32::NEG_INFINITY);
     let mut bounds = [nothing; LANES];
-    for (bound, by) in bounds.iter_mut().zip(&swing.by) {
-        let &[sin, versine, chord, travel] = by;
-        let tangent =
-            under.tangent + (forth * sin - back * versine - by_d * travel + about * chord);
+    for (bound, view) in bounds.iter_mut().zip(views) {
+        let seen = turn(middle, view.cos, view.sin, [-view.x, 0.0, 0.0]);
+        let over = under.slopes.over(seen) + under.slopes.rise_over(simd, view, lids);
+        let away = ((seen[2] - under.slopes.z).abs() - under.radius).max(0.0);
+        let tangent = over - away * away * bend;
         // As much again is for the rounding of these few.
-        *bound = near.select((tangent + under.lost).min(circle), nothing);
+        *bound = near.select((tangent + under.lost * 2.0).min(circle), nothing);
     }
     bounds
 }
@@ -255,9 +244,6 @@ impl<'a, S: Simd> Under<'a, S> {
         let u = load(simd, &lids.u);
         let vy = f32x8::from_slice(simd, &lids.v[0]);
         let vz = f32x8::from_slice(simd, &lids.v[1]);
-        let normal = load(simd, &lids.normal);
-        let above = f32x8::from_slice(simd, &lids.above);
-        let below = f32x8::from_slice(simd, &lids.below);
         let [d, y, z] = turn(middle, view.cos, view.sin, [-view.x, 0.0, 0.0]);
         // The tangent plane where the box comes nearest to the highest touch: away from that touch F
         // falls, and the plane with it.
@@ -267,22 +253,7 @@ impl<'a, S: Simd> Under<'a, S> {
         let near_d = (d - half_d).max(place[0]).min(d + half_d);
         let near_z = (z - half_z).max(place[1]).min(z + half_z);
         let slopes = Slopes::at(simd, cutter, [near_d, y, near_z]);
-        // Turned back into the part's frame, the plane's slopes tell how far it rises under a lid.
-        let slope = [
-            slopes.by_d,
-            slopes.by_z * view.sin + view.cos,
-            slopes.by_z * view.cos - view.sin,
-        ];
-        let by_w = dot3(slope, normal);
-        let outward = by_w.max(0.0);
-        let along_u = rise(
-            simd,
-            dot3(slope, u).abs(),
-            outward * f32x8::from_slice(simd, &lids.a),
-        );
-        let by_v = (slope[1] * vy + slope[2] * vz).abs();
-        let along_v = rise(simd, by_v, outward * f32x8::from_slice(simd, &lids.b));
-        let over = along_u + along_v + (by_w * above).max(-by_w * below);
+        let over = slopes.rise_over(simd, view, lids);
         let away_d = slopes.by_d * (d - slopes.d);
         let away_z = slopes.by_z * (z - slopes.z);
         let tangent = y + slopes.rise + away_d + away_z + over;
@@ -318,6 +289,35 @@ impl<'a, S: Simd> Under<'a, S> {
     }
 }
 
+impl<S: Simd> Slopes<S> {
+    /// How far the planes rise over the middles of lids, at most, as a position sees them.
+    #[inline(always)]
+    fn rise_over(&self, simd: S, view: &View, lids: &Lids) -> f32x8<S> {
+        let u = load(simd, &lids.u);
+        let vy = f32x8::from_slice(simd, &lids.v[0]);
+        let vz = f32x8::from_slice(simd, &lids.v[1]);
+        let normal = load(simd, &lids.normal);
+        let above = f32x8::from_slice(simd, &lids.above);
+        let below = f32x8::from_slice(simd, &lids.below);
+        // Turned back into the part's frame, the plane's slopes tell how far it rises under a lid.
+        let slope = [
+            self.by_d,
+            self.by_z * view.sin + view.cos,
+            self.by_z * view.cos - view.sin,
+        ];
+        let by_w = dot3(slope, normal);
+        let outward = by_w.max(0.0);
+        let along_u = rise(
+            simd,
+            dot3(slope, u).abs(),
+            outward * f32x8::from_slice(simd, &lids.a),
+        );
+        let by_v = (slope[1] * vy + slope[2] * vz).abs();
+        let along_v = rise(simd, by_v, outward * f32x8::from_slice(simd, &lids.b));
+        along_u + along_v + (by_w * above).max(-by_w * below)
+    }
+}
+
 /// The most of `by·s − bend·s²` for s in [0, 1].
 #[inline(always)]
 fn rise<S: Simd>(simd: S, by: f32x8<S>, bend: f32x8<S>) -> f32x8<S> {
@@ -350,13 +350,14 @@ mod tests {
     fn swung<S: Simd>(
         simd: S,
         cutter: &Cutter,
-        view: &View,
+        views: &[View; LANES],
+        from: usize,
         swing: &Swing,
         place: [f32; 2],
         lids: &Lids,
     ) -> [[f32; 8]; LANES] {
         let mut bounds = [[0.0; 8]; LANES];
-        let all = swung_lid_bounds(simd, cutter, view, swing, place, lids);
+        let all = swung_lid_bounds(simd, cutter, views, from, swing, place, lids);
         for (one, all) in bounds.iter_mut().zip(all) {
             *one = *all;
         }
@@ -435,6 +436,7 @@ mod tests {
             degrees in 0..360_i32,
             by in prop_oneof![Just(0.0), Just(0.1), Just(1.0), Just(25.0)],
             step in prop_oneof![Just(0.0), Just(0.005), Just(2.0)],
+            from in 0..LANES,
             which in 0..4_usize,
             shrink in prop_oneof![Just(1.0), Just(0.1), Just(0.001), Just(0.0)],
             place in prop::array::uniform2(-20.0..20.0_f32),
@@ -444,10 +446,10 @@ mod tests {
                 pose(x + far + step * k as f64, f64::from(degrees) + by * k as f64)
             });
             let (points, frame, held) = under_a_lid(&points, shrink, far);
-            let view = View::new(&frame, &cutter, &poses[0]);
-            let swing = Swing::new(poses.into_iter());
+            let views = poses.map(|pose| View::new(&frame, &cutter, &pose));
+            let swing = Swing::new(&poses[from], poses.into_iter());
             for level in Level::available() {
-                let bounds = with_simd!(level.token(), simd => swung(simd, &cutter, &view, &swing, place, &held));
+                let bounds = with_simd!(level.token(), simd => swung(simd, &cutter, &views, from, &swing, place, &held));
                 for (pose, bounds) in poses.iter().zip(bounds) {
                     for &p in &points {
                         if let Some(touch) = touch_point(&cutter, pose, p) {
