@@ -10,7 +10,7 @@ use std::ops::{Add, Mul, Sub};
 
 use super::INTERMEDIATE;
 use super::body::{Plane, Solid, larger, smaller};
-use super::hierarchy::{Child, Hierarchy, Lanes, Node, Stands, WIDTH};
+use super::hierarchy::{Child, Hierarchy, Lanes, Leaf, Node, Stands, WIDTH};
 use crate::vector::Point;
 
 /// The least clearance found, and where.
@@ -44,9 +44,9 @@ impl Least {
         }
     }
 
-    /// Whether a position was found.
-    pub fn is_found(&self) -> bool {
-        self.index != usize::MAX
+    /// The value, if a position was found.
+    pub fn found(&self) -> Option<f64> {
+        (self.index != usize::MAX).then_some(self.value)
     }
 
     #[inline(always)]
@@ -66,7 +66,7 @@ impl Clearance {
 
     #[inline(always)]
     fn may_improve(&self, bounds: [f32; 2]) -> bool {
-        let [normal, attack] = bounds.map(f64::from);
+        let [normal, attack] = [f64::from(bounds[0]), f64::from(bounds[1])];
         // What is not a number does not exclude anything.
         !((normal > self.normal.value) & (attack > self.attack.value))
     }
@@ -109,7 +109,9 @@ const ROUNDING: f64 = 64.0 / 16_777_216.0;
 impl<S: Solid> Hierarchy<S> {
     /// The least clearances of the point (mm) over the positions, and over the moves as far as they
     /// are no greater than those of `moving`. The leaves where those of a point nearby were found,
-    /// `hint`, are where to look first, and change nothing else.
+    /// `hint`, are where to look first, and change nothing else. Inlined, as is all that it calls, so that
+    /// it is compiled for the vectors of whoever calls it.
+    #[inline(always)]
     pub fn least(
         &self,
         point: Point,
@@ -123,7 +125,7 @@ impl<S: Solid> Hierarchy<S> {
         };
         let magnitude = point[0].abs() + point[1].abs() + point[2].abs() + self.magnitude;
         let query = Query {
-            point: point.map(|c| c as f32),
+            point: [point[0] as f32, point[1] as f32, point[2] as f32],
             radius: (point[1] * point[1] + point[2] * point[2]).sqrt() as f32,
             slack: (ROUNDING * magnitude) as f32,
         };
@@ -131,8 +133,7 @@ impl<S: Solid> Hierarchy<S> {
         let distinct = if leaves[0] == leaves[1] { 1 } else { 2 };
         for &number in &leaves[..distinct] {
             if let Some(leaf) = self.leaves.get(number) {
-                let number_of = |lane: usize| leaf.index[lane];
-                self.offer(&leaf.standing, number, number_of, point, &mut best.standing);
+                self.offer(leaf, None, number, point, &mut best.standing);
             }
         }
         stack.clear();
@@ -166,36 +167,39 @@ impl<S: Solid> Hierarchy<S> {
     fn open(&self, number: usize, bounds: [f32; 2], point: Point, best: &mut Found) {
         let leaf = &self.leaves[number];
         if best.standing.may_improve(bounds) {
-            let number_of = |lane: usize| leaf.index[lane];
-            self.offer(&leaf.standing, number, number_of, point, &mut best.standing);
+            self.offer(leaf, None, number, point, &mut best.standing);
         }
         if best.moving.may_improve(bounds) {
-            for (k, poses) in leaf.moving.iter().enumerate() {
-                let number_of = |lane: usize| leaf.index[lane].wrapping_mul(INTERMEDIATE) + k;
-                self.offer(poses, number, number_of, point, &mut best.moving);
+            for k in 0..INTERMEDIATE {
+                self.offer(leaf, Some(k), number, point, &mut best.moving);
             }
         }
     }
 
-    /// Offers what stands in the lanes of a leaf.
+    /// Offers the positions of a leaf, or pose `k` of each of its moves.
     #[inline(always)]
     fn offer(
         &self,
-        stands: &Stands<f64>,
-        leaf: usize,
-        number_of: impl Fn(usize) -> usize,
+        leaf: &Leaf,
+        k: Option<usize>,
+        number: usize,
         point: Point,
         best: &mut Clearance,
     ) {
+        let (stands, poses, pose) = match k {
+            None => (&leaf.standing, 1, 0),
+            Some(k) => (&leaf.moving[k], INTERMEDIATE, k),
+        };
         let (mut normal, mut attack) = ([0.0; WIDTH], [0.0; WIDTH]);
-        for k in 0..WIDTH {
-            let seen = seen(stands, k, point);
-            normal[k] = self.body.normal_clearance(seen);
-            attack[k] = self.body.attack_clearance(seen);
+        for lane in 0..WIDTH {
+            let seen = seen(stands, lane, point);
+            normal[lane] = self.body.normal_clearance(seen);
+            attack[lane] = self.body.attack_clearance(seen);
         }
-        for k in 0..WIDTH {
-            best.normal.offer(normal[k], number_of(k), leaf);
-            best.attack.offer(attack[k], number_of(k), leaf);
+        for lane in 0..WIDTH {
+            let index = leaf.index[lane].wrapping_mul(poses) + pose;
+            best.normal.offer(normal[lane], index, number);
+            best.attack.offer(attack[lane], index, number);
         }
     }
 

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::body::Solid;
 use super::hierarchy::Hierarchy;
 use super::search::{Clearance, Least, Stack};
+use crate::simd::{Simd, with_simd};
 use crate::vector::Point;
 
 /// Samples that one thread takes at a time.
@@ -39,10 +40,14 @@ pub(super) struct Worst {
 
 /// Holds samples against a path.
 pub(super) fn survey(hierarchy: &Hierarchy<impl Solid>, points: &[Point]) -> Survey {
+    let simd = Simd::best().token();
     let chunks: Vec<Survey> = points
         .par_chunks(CHUNK)
         .enumerate()
-        .map(|(chunk, points)| survey_chunk(hierarchy, points, chunk * CHUNK))
+        .map(|(chunk, points)| {
+            let first = chunk * CHUNK;
+            with_simd!(simd, _simd => survey_chunk(hierarchy, points, first))
+        })
         .collect();
     let mut all = Survey {
         normal: Vec::with_capacity(points.len()),
@@ -66,21 +71,22 @@ pub(super) fn survey(hierarchy: &Hierarchy<impl Solid>, points: &[Point]) -> Sur
     all
 }
 
+#[inline(always)]
 fn survey_chunk(hierarchy: &Hierarchy<impl Solid>, points: &[Point], first: usize) -> Survey {
     let mut stack = Stack::new();
     let mut last = Clearance::NONE;
     let mut all = Survey::default();
     for (sample, &p) in (first..).zip(points) {
         // Of the moves only what is deeper than the deepest so far is looked for.
-        let [normal, attack] = all.motion_gouges.map(|g| Least::below(limit(g)));
+        let [normal, attack] = all.motion_gouges;
+        let (normal, attack) = (Least::below(limit(normal)), Least::below(limit(attack)));
         // Where its neighbour's winners are, its own are not far.
         let found = hierarchy.least(p, Clearance { normal, attack }, &last, &mut stack);
         last = found.standing;
         all.gouges = worse(all.gouges, found.standing, sample);
         all.motion_gouges = worse(all.motion_gouges, found.moving, sample);
-        let clearance = |l: Least| l.is_found().then_some(l.value);
-        all.normal.extend(clearance(last.normal));
-        all.attack.push(clearance(last.attack).map(|c| c.max(0.0)));
+        all.normal.extend(last.normal.found());
+        all.attack.push(last.attack.found().map(|c| c.max(0.0)));
     }
     all
 }
@@ -93,14 +99,12 @@ fn limit(worst: Option<Worst>) -> f64 {
 /// The worst so far, or what is found for a later sample; only gouges count.
 fn worse(so_far: [Option<Worst>; 2], found: Clearance, sample: usize) -> [Option<Worst>; 2] {
     let found = [found.normal, found.attack];
-    std::array::from_fn(|m| {
-        let Least { value, index, .. } = found[m];
-        let deeper = found[m].is_found() && value < limit(so_far[m]);
-        let worst = Worst {
+    std::array::from_fn(|m| match found[m].found() {
+        Some(value) if value < limit(so_far[m]) => Some(Worst {
             value,
             sample,
-            index,
-        };
-        if deeper { Some(worst) } else { so_far[m] }
+            index: found[m].index,
+        }),
+        _ => so_far[m],
     })
 }
