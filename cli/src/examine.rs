@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use horma_core::{Machined, Part, Phase, Position, Shaped};
+use horma_core::{Designed, Machined, Part, Phase, Position, Shaped};
 use horma_formats::job::JobFile;
 use horma_formats::lasts::Lasts;
 use horma_formats::report::MachinedStatistics;
@@ -16,6 +16,8 @@ use crate::{lasts, machined, verify};
 /// A path and what it is about.
 pub(crate) struct Subject<'a> {
     pub part: &'a Part,
+    /// Its surface, if that is at hand.
+    pub designed: Option<Designed>,
     pub file: &'a JobFile,
     pub shaped: Option<&'a Shaped>,
     pub positions: &'a [Position],
@@ -32,17 +34,18 @@ pub(crate) struct Examined {
 /// Looks at a path, on `threads` threads; tells which phase it is at. Without rays nothing is told of the surface that
 /// it leaves.
 pub(crate) fn examine(
-    subject: &Subject,
+    subject: Subject,
     rays: Option<Spacing>,
     threads: usize,
     tell: &dyn Fn(&'static str),
 ) -> Result<Examined> {
     let Subject {
         part,
+        designed,
         file,
         shaped,
         positions,
-    } = *subject;
+    } = subject;
     let mut phases = Vec::new();
     let tolerance = verify::tolerance(file);
     let surface = match rays {
@@ -50,7 +53,7 @@ pub(crate) fn examine(
         Some(rays) => {
             tell("machine");
             let begin = Instant::now();
-            let made = machined::surface(part, file, positions, rays, threads)?;
+            let made = machined::surface(part, designed, file, positions, rays, threads)?;
             phases.push(phase("machine", begin));
             Some(made)
         }

@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use horma_core::{
-    Counters, Digitizer, Heuristic, Job, Local, Method, Part, Phase, Plan, Record, Simd, ToolPath,
-    stitch,
+    Counters, Designed, Digitizer, Heuristic, Job, Local, Method, Part, Phase, Plan, Record, Simd,
+    ToolPath, stitch,
 };
 use horma_master::Outcome;
 use tokio_util::sync::CancellationToken;
@@ -12,8 +12,8 @@ use tracing::Span;
 
 use crate::error::{Error, Result};
 use crate::progress::Display;
-use crate::run::unless;
-use crate::system;
+use crate::run::{Computed, unless};
+use crate::{machined, system};
 
 /// Digitizes a part for one job after the other, beside the runtime, until `stop`.
 pub(crate) async fn run_all(
@@ -23,17 +23,24 @@ pub(crate) async fn run_all(
     simd: Simd,
     display: Display,
     stop: CancellationToken,
-) -> Result<Vec<Outcome>> {
+) -> Result<Computed> {
     let (stopped, span) = (stop.clone(), Span::current());
     let all = move || {
-        let run = |job| run(&part, job, threads, simd, &display, &stopped);
-        span.in_scope(|| jobs.into_iter().map(run).collect())
+        let mut computed = Computed::default();
+        let _within = span.entered();
+        for job in jobs {
+            let (outcome, designed) = run(&part, job, threads, simd, &display, &stopped)?;
+            computed.outcomes.push(outcome);
+            computed.designed = designed;
+        }
+        Ok(computed)
     };
     let all = tokio::task::spawn_blocking(all);
     unless(stop, async { all.await.unwrap_or(Err(Error::Interrupted)) }).await
 }
 
-/// Digitizes a part on `threads` threads of this process, until `stop`.
+/// Digitizes a part on `threads` threads of this process, until `stop`. The designed surface comes along if
+/// that was digitized.
 pub(crate) fn run(
     part: &Part,
     job: Job,
@@ -41,7 +48,7 @@ pub(crate) fn run(
     simd: Simd,
     display: &Display,
     stop: &CancellationToken,
-) -> Result<Outcome> {
+) -> Result<(Outcome, Option<Designed>)> {
     system::pool(threads)?.install(|| pipeline(part, job, simd, display, stop))
 }
 
@@ -51,7 +58,7 @@ fn pipeline(
     simd: Simd,
     display: &Display,
     stop: &CancellationToken,
-) -> Result<Outcome> {
+) -> Result<(Outcome, Option<Designed>)> {
     let mut phases = Vec::new();
     let mut timed = |name: &'static str, begin: Instant| {
         phases.push(Phase {
@@ -64,6 +71,7 @@ fn pipeline(
     let plan = Plan::new(part, job, system::memory())?;
     timed("discretize", begin);
 
+    let mut designed = None;
     let (path, counters, window) = match job.method {
         Method::Local(local) if local.needs_whole_path() => {
             display.tell("find the window", 0, 0);
@@ -76,7 +84,8 @@ fn pipeline(
                 let window = Some(window);
                 let method = Method::Local(Local { window, ..local });
                 let job = Job { method, ..job };
-                digitize(&plan, &job, simd, display, stop, &mut timed)?
+                let found = digitize(&plan, &job, simd, display, stop, &mut timed)?;
+                (found.0, found.1)
             } else {
                 display.tell("digitize", 0, 0);
                 let begin = Instant::now();
@@ -93,7 +102,9 @@ fn pipeline(
             (path, counters, Some(window))
         }
         method => {
-            let (path, counters) = digitize(&plan, &job, simd, display, stop, &mut timed)?;
+            let found = digitize(&plan, &job, simd, display, stop, &mut timed)?;
+            let (path, counters, digitizer) = found;
+            designed = machined::at_hand(&job, digitizer, &plan.model)?;
             let window = match method {
                 Method::Local(local) => local.window,
                 Method::Exact | Method::Brute => None,
@@ -108,10 +119,10 @@ fn pipeline(
         window,
         ..Record::default()
     };
-    Ok((path, record))
+    Ok(((path, record), designed))
 }
 
-/// Digitizes all positions and stitches what the threads found.
+/// Digitizes all positions and stitches what the threads found; the digitizer comes along.
 fn digitize(
     plan: &Plan,
     job: &Job,
@@ -119,7 +130,7 @@ fn digitize(
     display: &Display,
     stop: &CancellationToken,
     timed: &mut impl FnMut(&'static str, Instant),
-) -> Result<(ToolPath, Counters)> {
+) -> Result<(ToolPath, Counters, Digitizer)> {
     display.tell("build", 0, 0);
     let begin = Instant::now();
     let digitizer = Digitizer::new(job, &plan.model.rows, simd);
@@ -147,5 +158,5 @@ fn digitize(
     let begin = Instant::now();
     let path = stitch(plan.trajectory, parts)?;
     timed("stitch", begin);
-    Ok((path, counters))
+    Ok((path, counters, digitizer))
 }

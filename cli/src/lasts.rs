@@ -100,7 +100,7 @@ fn of_job(args: &args::Measure, job: &Path) -> Result<Lasts> {
         Some(path) => {
             let positions: Vec<_> = csv::read(path)?.iter().map(csv::Row::position).collect();
             let threads = args.threads.map_or_else(system::cores, usize::from);
-            let made = machined::surface(&part, &file, &positions, FOR_REPORT, threads)?;
+            let made = machined::surface(&part, None, &file, &positions, FOR_REPORT, threads)?;
             Some(made)
         }
     };

@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use horma_core::{
-    Counters, Discretization, Machined, Outline, Part, Position, Rays, Record, Simd, Waypoint,
-    discretize,
+    Coordinates, Counters, Designed, Digitizer, Discretization, Job, Machined, Model, Part,
+    Position, Rays, Record, Simd, Waypoint, discretize,
 };
 use horma_formats::also::{self, Also, Sources};
 use horma_formats::job::{JobFile, Overrides};
@@ -43,9 +43,20 @@ const MOST: f64 = 1.0e6;
 /// Chordal tolerance of the designed surface that a machined one is measured against, mm.
 const FINE: f64 = 0.01;
 
-/// What a path leaves of a part.
+/// The designed surface that was made for a job itself, if it is the one that [`surface`] would make.
+pub(crate) fn at_hand(job: &Job, digitizer: Digitizer, model: &Model) -> Result<Option<Designed>> {
+    match (job.discretization, job.coordinates) {
+        (Discretization::Tolerance(tolerance), Coordinates::Double) if tolerance <= FINE => {
+            Ok(Designed::of(digitizer, model)?)
+        }
+        _ => Ok(None),
+    }
+}
+
+/// What a path leaves of a part, whose designed surface may be at hand.
 pub(crate) fn surface(
     part: &Part,
+    designed: Option<Designed>,
     file: &JobFile,
     positions: &[Position],
     spacing: Spacing,
@@ -57,15 +68,21 @@ pub(crate) fn surface(
         Discretization::Grid { .. } => FINE,
     };
     system::pool(threads)?.install(|| {
-        let model = discretize(part, Discretization::Tolerance(fine))?;
-        let span = Outline::span(&model.outlines);
+        let designed = match designed {
+            Some(designed) => designed,
+            None => {
+                let model = discretize(part, Discretization::Tolerance(fine))?;
+                Designed::new(&model, Simd::best())?
+            }
+        };
+        let span = designed.along;
         let mut along = spacing.along;
         if spacing.or_farther {
             along = along.max((span.high - span.low) * f64::from(spacing.columns) / MOST);
         }
         let rays = Rays::over(span, along, spacing.columns)?;
-        let (rows, cutter) = (&model.rows, &file.job.cutter);
-        let made = horma_core::machined(rows, cutter, positions, rays, Simd::best());
+        let cutter = &file.job.cutter;
+        let made = horma_core::machined(&designed, cutter, positions, rays, Simd::best());
         Ok(made?)
     })
 }
@@ -85,6 +102,7 @@ pub(crate) fn machined(args: &args::Machined) -> Result<()> {
     let positions: Vec<Position> = rows.iter().map(csv::Row::position).collect();
     let subject = Subject {
         part,
+        designed: None,
         file,
         shaped: prepared.shaped.as_ref(),
         positions: &positions,
@@ -106,7 +124,7 @@ pub(crate) fn machined(args: &args::Machined) -> Result<()> {
         phases.push(run::phase("verify", begin));
     }
     let (verification, clearances) = verified.unzip();
-    let found = examine(&subject, rays, threads, &|_| {})?;
+    let found = examine(subject, rays, threads, &|_| {})?;
     phases.extend(found.phases);
 
     let begin = Instant::now();

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use horma_core::{Job, Method, Part, Phase, Record, Shaped, Simd, ToolPath, place};
+use horma_core::{Designed, Job, Method, Part, Phase, Record, Shaped, Simd, ToolPath, place};
 use horma_formats::csv;
 use horma_formats::job::{self, JobFile, Overrides};
 use horma_formats::output::{self, Staging};
@@ -77,7 +77,7 @@ fn one(args: &args::Run, output: &Path, stop: &CancellationToken) -> Result<()> 
             };
             let run = cluster::run(part, targets, sharing, workers, progress);
             // Dropping it stops the workers.
-            unless(stop, run).await
+            Ok(unless(stop, run).await?.into())
         },
     )
 }
@@ -117,7 +117,7 @@ pub(crate) fn submit(args: &args::Submit) -> Result<()> {
                 }
                 outcomes.push(fetched?);
             }
-            Ok(outcomes)
+            Ok(outcomes.into())
         },
     )?;
     leave(&remote, &sent)
@@ -159,7 +159,7 @@ pub(crate) fn fetch(args: args::Fetch) -> Result<()> {
             perform(&asked, None, None, &stop, async |_, _, _, display, stop| {
                 let progress = progress(display);
                 let fetched = unless(stop, submit::fetch(&remote, id, wait, &progress)).await;
-                Ok(vec![fetched?])
+                Ok(vec![fetched?].into())
             })?;
         }
         None => fetch_alone(&remote, id, wait, &output, args.how.audience())?,
@@ -262,6 +262,24 @@ pub(crate) async fn unless<T>(
     }
 }
 
+/// What computing a job gave.
+#[derive(Default)]
+pub(crate) struct Computed {
+    /// For each pass.
+    pub outcomes: Vec<Outcome>,
+    /// The part's designed surface, if that was made here on the way.
+    pub designed: Option<Designed>,
+}
+
+impl From<Vec<Outcome>> for Computed {
+    fn from(outcomes: Vec<Outcome>) -> Self {
+        Self {
+            outcomes,
+            designed: None,
+        }
+    }
+}
+
 /// A job with its part in place.
 pub(crate) struct Prepared {
     pub part: Part,
@@ -304,13 +322,7 @@ fn perform(
     workers: Option<u32>,
     threads: Option<usize>,
     stop: &CancellationToken,
-    compute: impl AsyncFnOnce(
-        Part,
-        &JobFile,
-        Vec<Job>,
-        Display,
-        CancellationToken,
-    ) -> Result<Vec<Outcome>>,
+    compute: impl AsyncFnOnce(Part, &JobFile, Vec<Job>, Display, CancellationToken) -> Result<Computed>,
 ) -> Result<()> {
     let runtime = runtime()?;
     stop_when_interrupted(&runtime, stop);
@@ -349,13 +361,7 @@ pub(crate) async fn carry_out(
     threads: Option<usize>,
     display: &Display,
     stop: &CancellationToken,
-    compute: impl AsyncFnOnce(
-        Part,
-        &JobFile,
-        Vec<Job>,
-        Display,
-        CancellationToken,
-    ) -> Result<Vec<Outcome>>,
+    compute: impl AsyncFnOnce(Part, &JobFile, Vec<Job>, Display, CancellationToken) -> Result<Computed>,
 ) -> Result<Report> {
     display.tell("read", 0, 0);
     let begin = Instant::now();
@@ -376,7 +382,10 @@ pub(crate) async fn carry_out(
         display.warn(warning);
     }
     let computing = compute(part.clone(), &file, targets, display.clone(), stop.clone());
-    let (digitized, mut record) = of_finish(computing.await?);
+    let needed = !asked.how.no_verify || file.also.iter().any(|a| a.needs_surface());
+    let computed = computing.await?;
+    let designed = computed.designed.filter(|_| needed);
+    let (digitized, mut record) = of_finish(computed.outcomes);
     record.phases.insert(0, read);
     let threads = threads.unwrap_or_else(system::cores);
     let begin = Instant::now();
@@ -410,20 +419,20 @@ pub(crate) async fn carry_out(
         }
         Some(found.finish)
     };
-    let needed = !asked.how.no_verify || file.also.iter().any(|a| a.needs_surface());
     let examining = {
         let (part, file, display) = (part.clone(), file.clone(), display.clone());
         let positions = passes.finish.positions();
         move || {
             let subject = Subject {
                 part: &part,
+                designed,
                 file: &file,
                 shaped: shaped.as_ref(),
                 positions: &positions,
             };
             let rays = needed.then_some(FOR_REPORT);
             let tell = |phase| display.tell(phase, 0, 0);
-            examine(&subject, rays, threads, &tell)
+            examine(subject, rays, threads, &tell)
         }
     };
     let examining = tokio::task::spawn_blocking(examining);

@@ -180,7 +180,8 @@ async fn one(
             match cluster {
                 Some(local) => {
                     let (sharing, progress) = (file.cluster.sharing, progress(display));
-                    unless(stop, local.run_all(part, targets, sharing, &progress)).await
+                    let run = local.run_all(part, targets, sharing, &progress);
+                    Ok(unless(stop, run).await?.into())
                 }
                 None => here::run_all(part, targets, threads, simd, display, stop).await,
             }

@@ -85,6 +85,16 @@ impl Digitizer {
         }
     }
 
+    /// The same facets under another cutter, each position for itself; `None` if these are not facets to be
+    /// searched exactly.
+    pub(crate) fn under(self, cutter: Cutter) -> Option<Self> {
+        matches!(self.search, Search::Facets(_)).then_some(Self {
+            cutter,
+            path_tolerance: None,
+            ..self
+        })
+    }
+
     /// Memory that the rows take beyond themselves, bytes.
     pub fn bytes(&self) -> usize {
         match &self.search {

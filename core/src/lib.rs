@@ -154,7 +154,7 @@ pub use part::{Body, Mesh, Part, Shape};
 pub use path::{Inserted, SubTrajectory, ToolPath, Touch, Waypoint, stitch};
 pub use placement::{Axis, place};
 pub use plan::{Handout, Plan, Stock};
-pub use rays::{Machined, Rays, Spot, machined};
+pub use rays::{Designed, Machined, Rays, Spot, machined};
 pub use record::{BodyRecord, Counters, ExtentRecord, LostAttempt, Phase, Record};
 pub use record::{SecondAttempt, Share, Traffic, WorkerRecord};
 pub use row::{Outline, Row, RowKind};

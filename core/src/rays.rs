@@ -12,10 +12,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::cutter::Cutter;
 use crate::digitize::Digitizer;
+use crate::discretize::Model;
 use crate::error::{Error, Result, bounded};
 use crate::job::{Contact, Coordinates, Discretization, Job, Method};
 use crate::motion::{Motion, MotionKind, Trajectory};
-use crate::row::Row;
+use crate::path::Touch;
+use crate::row::Outline;
 use crate::simd::Simd;
 use crate::vector::{Interval, Point, facing};
 use crate::verify::Position;
@@ -219,20 +221,88 @@ impl Rays {
     }
 }
 
-/// What a path of `cutter` makes of the part whose rows these are. The cutter moves straight from each
-/// position to the next; of each move some poses count. Runs on the current thread pool.
+/// The designed surface of a part, ready for rays.
+#[derive(Debug)]
+pub struct Designed {
+    /// Its extent along the spindle, mm.
+    pub along: Interval,
+    probe: Digitizer,
+}
+
+impl Designed {
+    /// That of a model's facets. Runs on the current thread pool.
+    ///
+    /// # Errors
+    /// None: the probe is a valid cutter.
+    pub fn new(model: &Model, simd: Simd) -> Result<Self> {
+        let job = Job {
+            // Already done.
+            discretization: Discretization::Tolerance(PROBE),
+            cutter: Cutter::ball(PROBE)?,
+            motion: Motion {
+                kind: MotionKind::Rings,
+                step: PROBE,
+                points_per_revolution: 1,
+                from: None,
+                to: None,
+                path_tolerance: None,
+                lead: [0.0; 2],
+            },
+            coordinates: Coordinates::Double,
+            contact: Contact::Facet,
+            method: Method::Exact,
+        };
+        Ok(Self {
+            along: Outline::span(&model.outlines),
+            probe: Digitizer::new(&job, &model.rows, simd),
+        })
+    }
+
+    /// That of the facets of a model that a path was digitized from; `None` if that was not done by the
+    /// exact search over them.
+    ///
+    /// # Errors
+    /// None: the probe is a valid cutter.
+    pub fn of(digitizer: Digitizer, model: &Model) -> Result<Option<Self>> {
+        let along = Outline::span(&model.outlines);
+        let probe = digitizer.under(Cutter::ball(PROBE)?);
+        Ok(probe.map(|probe| Self { along, probe }))
+    }
+
+    /// Where each ray last meets a facet: what a probe touches that comes in along it. Nothing in rows of
+    /// which a ray meets none: there the spindle is outside of the part, and rays from it tell nothing.
+    fn radii(&self, rays: &Rays) -> Vec<Option<f64>> {
+        let mut radii = Vec::with_capacity(rays.len());
+        let all = 0..rays.len() as u64;
+        self.probe.run_chunks(&rays.rings(), all, |chunk, _| {
+            // On the far side of the spindle there is another ray.
+            let radius = |t: Touch| (t.height > PROBE).then(|| across(t.contact));
+            radii.extend(chunk.touches.into_iter().map(|t| t.and_then(radius)));
+            true
+        });
+        for row in radii.chunks_mut(rays.columns as usize) {
+            if row.contains(&None) {
+                row.fill(None);
+            }
+        }
+        radii
+    }
+}
+
+/// What a path of `cutter` makes of a part. The cutter moves straight from each position to the next; of
+/// each move some poses count. Runs on the current thread pool.
 ///
 /// # Errors
 /// Those of [`crate::verify()`] for positions.
 pub fn machined(
-    rows: &[Row],
+    designed: &Designed,
     cutter: &Cutter,
     positions: &[Position],
     rays: Rays,
     simd: Simd,
 ) -> Result<Machined> {
     crate::verify::check(positions)?;
-    let designed = designed(rows, &rays, simd)?;
+    let designed = designed.radii(&rays);
     let machined = cut::cut(cutter, positions, &rays, simd);
     let slant = slants(&rays, &designed);
     let both = designed.iter().zip(&machined).zip(slant);
@@ -245,50 +315,6 @@ pub fn machined(
         machined,
         deviation,
     })
-}
-
-/// Where each ray last meets a facet: what a probe touches that comes in along it. Nothing in rows of which
-/// a ray meets none: there the spindle is outside of the part, and rays from it tell nothing.
-fn designed(rows: &[Row], rays: &Rays, simd: Simd) -> Result<Vec<Option<f64>>> {
-    let probe = Job {
-        // Already done.
-        discretization: Discretization::Tolerance(PROBE),
-        cutter: Cutter::ball(PROBE)?,
-        motion: Motion {
-            kind: MotionKind::Rings,
-            step: rays.step,
-            points_per_revolution: rays.columns,
-            from: None,
-            to: None,
-            path_tolerance: None,
-            lead: [0.0; 2],
-        },
-        coordinates: Coordinates::Double,
-        contact: Contact::Facet,
-        method: Method::Exact,
-    };
-    let mut radii = Vec::with_capacity(rays.len());
-    Digitizer::new(&probe, rows, simd).run_chunks(
-        &rays.rings(),
-        0..rays.len() as u64,
-        |chunk, _| {
-            // On the far side of the spindle there is another ray.
-            let radius = |t: crate::path::Touch| (t.height > PROBE).then(|| across(t.contact));
-            radii.extend(
-                chunk
-                    .touches
-                    .into_iter()
-                    .map(|touch| touch.and_then(radius)),
-            );
-            true
-        },
-    );
-    for row in radii.chunks_mut(rays.columns as usize) {
-        if row.contains(&None) {
-            row.fill(None);
-        }
-    }
-    Ok(radii)
 }
 
 fn across(p: Point) -> f64 {
@@ -325,7 +351,7 @@ mod tests {
     use crate::part::{Body, Mesh, Part, Shape};
 
     /// A round bar along the spindle as a mesh.
-    fn bar(radius: f64, long: f64, around: u32) -> Vec<Row> {
+    fn bar(radius: f64, long: f64, around: u32) -> Designed {
         let mut vertices = Vec::new();
         for end in [0.0, long] {
             for k in 0..around {
@@ -343,7 +369,7 @@ mod tests {
             shape: Shape::Mesh(mesh),
         }];
         let model = discretize(&Part { bodies }, Discretization::Tolerance(0.1));
-        model.expect("a model").rows
+        Designed::new(&model.expect("a model"), Simd::best()).expect("valid")
     }
 
     fn helix(height: impl Fn(usize) -> f64, count: usize) -> Vec<Position> {
@@ -359,7 +385,7 @@ mod tests {
     /// but for where one position is half a millimetre too low.
     #[test]
     fn what_one_low_position_does_is_seen_where_it_was() {
-        let rows = bar(20.0, 40.0, 720);
+        let designed = bar(20.0, 40.0, 720);
         let cutter = Cutter::torus(40.0, 8.0).expect("valid");
         let low = 2000;
         let path = helix(|i| 68.03 - if i == low { 0.53 } else { 0.0 }, 4001);
@@ -372,7 +398,7 @@ mod tests {
             360,
         )
         .expect("few");
-        let found = machined(&rows, &cutter, &path, rays, Simd::best()).expect("valid");
+        let found = machined(&designed, &cutter, &path, rays, Simd::best()).expect("valid");
         let deepest = found.deepest().expect("some");
         assert!((deepest.x - path[low].x).abs() <= rays.step, "{deepest:?}");
         assert_eq!(deepest.angle, path[low].angle % 360.0);

@@ -5,8 +5,9 @@
 //! that errors are those of the path alone.
 
 use horma_core::{
-    Contact, Coordinates, Cutter, Digitizer, Discretization, Frame, Grading, Hold, Interval, Job,
-    Last, Measures, Method, Motion, MotionKind, Plan, Rays, Shaped, Simd, System, machined, shape,
+    Contact, Coordinates, Cutter, Designed, Digitizer, Discretization, Frame, Grading, Hold,
+    Interval, Job, Last, Measures, Method, Motion, MotionKind, Plan, Rays, Shaped, Simd, System,
+    machined, shape,
 };
 use horma_formats::lasts::ALLOWED;
 use horma_formats::plot::{Curve, Plot, Scale};
@@ -178,7 +179,11 @@ impl Subject {
         let digitizer = Digitizer::new(&job, rows, Simd::best());
         let path = digitizer.path(&trajectory).0.positions();
         let rays = Rays::over(long, SPACING, COLUMNS)?;
-        let surface = machined(rows, &job.cutter, &path, rays, Simd::best())?;
+        let designed = match Designed::of(digitizer, &plan.model)? {
+            Some(designed) => designed,
+            None => Designed::new(&plan.model, Simd::best())?,
+        };
+        let surface = machined(&designed, &job.cutter, &path, rays, Simd::best())?;
         let (measures, known) = self.last.machined(&self.shaped, &surface, step)?;
         Ok(Made {
             designed: four(&self.shaped.measures),

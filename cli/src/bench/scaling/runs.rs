@@ -119,7 +119,7 @@ async fn alone(part: Part, case: &Case, round: u32) -> Result<(Run, ToolPath)> {
         here::run(&part, job, 1, Simd::best(), &quiet, &stop)
     };
     let ran = tokio::task::spawn_blocking(run).await;
-    let (path, record) = ran.unwrap_or(Err(Error::Interrupted))?;
+    let ((path, record), _) = ran.unwrap_or(Err(Error::Interrupted))?;
     let run = Run {
         case: *case,
         round,
