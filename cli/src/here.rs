@@ -104,7 +104,7 @@ fn pipeline(
         method => {
             let found = digitize(&plan, &job, simd, display, stop, &mut timed)?;
             let (path, counters, digitizer) = found;
-            designed = machined::at_hand(&job, digitizer, &plan.model)?;
+            designed = machined::at_hand(&job, digitizer, &plan.model);
             let window = match method {
                 Method::Local(local) => local.window,
                 Method::Exact | Method::Brute => None,

@@ -44,12 +44,12 @@ const MOST: f64 = 1.0e6;
 const FINE: f64 = 0.01;
 
 /// The designed surface that was made for a job itself, if it is the one that [`surface`] would make.
-pub(crate) fn at_hand(job: &Job, digitizer: Digitizer, model: &Model) -> Result<Option<Designed>> {
+pub(crate) fn at_hand(job: &Job, digitizer: Digitizer, model: &Model) -> Option<Designed> {
     match (job.discretization, job.coordinates) {
         (Discretization::Tolerance(tolerance), Coordinates::Double) if tolerance <= FINE => {
-            Ok(Designed::of(digitizer, model)?)
+            Designed::of(digitizer, model)
         }
-        _ => Ok(None),
+        _ => None,
     }
 }
 
@@ -72,7 +72,7 @@ pub(crate) fn surface(
             Some(designed) => designed,
             None => {
                 let model = discretize(part, Discretization::Tolerance(fine))?;
-                Designed::new(&model, Simd::best())?
+                Designed::new(&model, Simd::best())
             }
         };
         let span = designed.along;

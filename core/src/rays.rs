@@ -231,14 +231,11 @@ pub struct Designed {
 
 impl Designed {
     /// That of a model's facets. Runs on the current thread pool.
-    ///
-    /// # Errors
-    /// None: the probe is a valid cutter.
-    pub fn new(model: &Model, simd: Simd) -> Result<Self> {
+    pub fn new(model: &Model, simd: Simd) -> Self {
         let job = Job {
             // Already done.
             discretization: Discretization::Tolerance(PROBE),
-            cutter: Cutter::ball(PROBE)?,
+            cutter: probe(),
             motion: Motion {
                 kind: MotionKind::Rings,
                 step: PROBE,
@@ -252,21 +249,18 @@ impl Designed {
             contact: Contact::Facet,
             method: Method::Exact,
         };
-        Ok(Self {
+        Self {
             along: Outline::span(&model.outlines),
             probe: Digitizer::new(&job, &model.rows, simd),
-        })
+        }
     }
 
     /// That of the facets of a model that a path was digitized from; `None` if that was not done by the
     /// exact search over them.
-    ///
-    /// # Errors
-    /// None: the probe is a valid cutter.
-    pub fn of(digitizer: Digitizer, model: &Model) -> Result<Option<Self>> {
+    pub fn of(digitizer: Digitizer, model: &Model) -> Option<Self> {
         let along = Outline::span(&model.outlines);
-        let probe = digitizer.under(Cutter::ball(PROBE)?);
-        Ok(probe.map(|probe| Self { along, probe }))
+        let probe = digitizer.under(probe())?;
+        Some(Self { along, probe })
     }
 
     /// Where each ray last meets a facet: what a probe touches that comes in along it. Nothing in rows of
@@ -287,6 +281,10 @@ impl Designed {
         }
         radii
     }
+}
+
+fn probe() -> Cutter {
+    Cutter::ball(PROBE).expect("its radius is positive")
 }
 
 /// What a path of `cutter` makes of a part. The cutter moves straight from each position to the next; of
@@ -369,7 +367,7 @@ mod tests {
             shape: Shape::Mesh(mesh),
         }];
         let model = discretize(&Part { bodies }, Discretization::Tolerance(0.1));
-        Designed::new(&model.expect("a model"), Simd::best()).expect("valid")
+        Designed::new(&model.expect("a model"), Simd::best())
     }
 
     fn helix(height: impl Fn(usize) -> f64, count: usize) -> Vec<Position> {

@@ -179,10 +179,8 @@ impl Subject {
         let digitizer = Digitizer::new(&job, rows, Simd::best());
         let path = digitizer.path(&trajectory).0.positions();
         let rays = Rays::over(long, SPACING, COLUMNS)?;
-        let designed = match Designed::of(digitizer, &plan.model)? {
-            Some(designed) => designed,
-            None => Designed::new(&plan.model, Simd::best())?,
-        };
+        let designed = Designed::of(digitizer, &plan.model)
+            .unwrap_or_else(|| Designed::new(&plan.model, Simd::best()));
         let surface = machined(&designed, &job.cutter, &path, rays, Simd::best())?;
         let (measures, known) = self.last.machined(&self.shaped, &surface, step)?;
         Ok(Made {
