@@ -71,8 +71,7 @@ fn pipeline(
     let plan = Plan::new(part, job, system::memory())?;
     timed("discretize", begin);
 
-    let mut designed = None;
-    let (path, counters, window) = match job.method {
+    let (path, counters, designed, window) = match job.method {
         Method::Local(local) if local.needs_whole_path() => {
             display.tell("find the window", 0, 0);
             let begin = Instant::now();
@@ -80,12 +79,11 @@ fn pipeline(
             let heuristic = Heuristic::new(&job, local, rows, &plan.trajectory, simd);
             let window = local.window.unwrap_or_else(|| heuristic.smallest_window());
             timed("find the window", begin);
-            let (path, counters) = if local.fallback {
+            let (path, counters, designed) = if local.fallback {
                 let window = Some(window);
                 let method = Method::Local(Local { window, ..local });
                 let job = Job { method, ..job };
-                let found = digitize(&plan, &job, simd, display, stop, &mut timed)?;
-                (found.0, found.1)
+                digitize(&plan, &job, simd, display, stop, &mut timed)?
             } else {
                 display.tell("digitize", 0, 0);
                 let begin = Instant::now();
@@ -97,19 +95,18 @@ fn pipeline(
                     touches,
                     between: Vec::new(),
                 };
-                (path, counters)
+                (path, counters, None)
             };
-            (path, counters, Some(window))
+            (path, counters, designed, Some(window))
         }
         method => {
             let found = digitize(&plan, &job, simd, display, stop, &mut timed)?;
-            let (path, counters, digitizer) = found;
-            designed = machined::at_hand(&job, digitizer, &plan.model);
+            let (path, counters, designed) = found;
             let window = match method {
                 Method::Local(local) => local.window,
                 Method::Exact | Method::Brute => None,
             };
-            (path, counters, window)
+            (path, counters, designed, window)
         }
     };
     let record = Record {
@@ -122,7 +119,8 @@ fn pipeline(
     Ok(((path, record), designed))
 }
 
-/// Digitizes all positions and stitches what the threads found; the digitizer comes along.
+/// Digitizes all positions and stitches what the threads found. The designed surface comes along if that was
+/// digitized.
 fn digitize(
     plan: &Plan,
     job: &Job,
@@ -130,7 +128,7 @@ fn digitize(
     display: &Display,
     stop: &CancellationToken,
     timed: &mut impl FnMut(&'static str, Instant),
-) -> Result<(ToolPath, Counters, Digitizer)> {
+) -> Result<(ToolPath, Counters, Option<Designed>)> {
     display.tell("build", 0, 0);
     let begin = Instant::now();
     let digitizer = Digitizer::new(job, &plan.model.rows, simd);
@@ -158,5 +156,6 @@ fn digitize(
     let begin = Instant::now();
     let path = stitch(plan.trajectory, parts)?;
     timed("stitch", begin);
-    Ok((path, counters, digitizer))
+    let designed = machined::at_hand(job, digitizer, &plan.model);
+    Ok((path, counters, designed))
 }

@@ -43,14 +43,19 @@ const MOST: f64 = 1.0e6;
 /// Chordal tolerance of the designed surface that a machined one is measured against, mm.
 const FINE: f64 = 0.01;
 
+/// How the designed surface of a job is discretized: it is compared with, so its facets have to be fine,
+/// whatever the path was made of.
+fn fine(job: &Job) -> Discretization {
+    Discretization::Tolerance(match job.discretization {
+        Discretization::Tolerance(tolerance) => tolerance.min(FINE),
+        Discretization::Grid { .. } => FINE,
+    })
+}
+
 /// The designed surface that was made for a job itself, if it is the one that [`surface`] would make.
 pub(crate) fn at_hand(job: &Job, digitizer: Digitizer, model: &Model) -> Option<Designed> {
-    match (job.discretization, job.coordinates) {
-        (Discretization::Tolerance(tolerance), Coordinates::Double) if tolerance <= FINE => {
-            Designed::of(digitizer, model)
-        }
-        _ => None,
-    }
+    let same = job.discretization == fine(job) && job.coordinates == Coordinates::Double;
+    Designed::of(digitizer, model).filter(|_| same)
 }
 
 /// What a path leaves of a part, whose designed surface may be at hand.
@@ -62,16 +67,11 @@ pub(crate) fn surface(
     spacing: Spacing,
     threads: usize,
 ) -> Result<Machined> {
-    // The designed surface is compared with, so its facets have to be fine, whatever the path was made of.
-    let fine = match file.job.discretization {
-        Discretization::Tolerance(tolerance) => tolerance.min(FINE),
-        Discretization::Grid { .. } => FINE,
-    };
     system::pool(threads)?.install(|| {
         let designed = match designed {
             Some(designed) => designed,
             None => {
-                let model = discretize(part, Discretization::Tolerance(fine))?;
+                let model = discretize(part, fine(&file.job))?;
                 Designed::new(&model, Simd::best())
             }
         };

@@ -85,6 +85,17 @@ impl Digitizer {
         }
     }
 
+    /// Makes facets ready for a cutter, each position for itself and by the exact search. Runs on the current
+    /// thread pool.
+    pub(crate) fn over_facets(cutter: Cutter, rows: &[Row], simd: Simd) -> Self {
+        Self {
+            cutter,
+            path_tolerance: None,
+            simd: simd.token(),
+            search: Search::Facets(facet_tree(rows)),
+        }
+    }
+
     /// The same facets under another cutter, each position for itself; `None` if these are not facets to be
     /// searched exactly.
     pub(crate) fn under(self, cutter: Cutter) -> Option<Self> {

@@ -14,8 +14,7 @@ use crate::cutter::Cutter;
 use crate::digitize::Digitizer;
 use crate::discretize::Model;
 use crate::error::{Error, Result, bounded};
-use crate::job::{Contact, Coordinates, Discretization, Job, Method};
-use crate::motion::{Motion, MotionKind, Trajectory};
+use crate::motion::{MotionKind, Trajectory};
 use crate::path::Touch;
 use crate::row::Outline;
 use crate::simd::Simd;
@@ -232,26 +231,9 @@ pub struct Designed {
 impl Designed {
     /// That of a model's facets. Runs on the current thread pool.
     pub fn new(model: &Model, simd: Simd) -> Self {
-        let job = Job {
-            // Already done.
-            discretization: Discretization::Tolerance(PROBE),
-            cutter: probe(),
-            motion: Motion {
-                kind: MotionKind::Rings,
-                step: PROBE,
-                points_per_revolution: 1,
-                from: None,
-                to: None,
-                path_tolerance: None,
-                lead: [0.0; 2],
-            },
-            coordinates: Coordinates::Double,
-            contact: Contact::Facet,
-            method: Method::Exact,
-        };
         Self {
             along: Outline::span(&model.outlines),
-            probe: Digitizer::new(&job, &model.rows, simd),
+            probe: Digitizer::over_facets(probe(), &model.rows, simd),
         }
     }
 
@@ -346,6 +328,7 @@ fn slants(rays: &Rays, radii: &[Option<f64>]) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::discretize::discretize;
+    use crate::job::Discretization;
     use crate::part::{Body, Mesh, Part, Shape};
 
     /// A round bar along the spindle as a mesh.

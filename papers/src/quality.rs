@@ -179,8 +179,7 @@ impl Subject {
         let digitizer = Digitizer::new(&job, rows, Simd::best());
         let path = digitizer.path(&trajectory).0.positions();
         let rays = Rays::over(long, SPACING, COLUMNS)?;
-        let designed = Designed::of(digitizer, &plan.model)
-            .unwrap_or_else(|| Designed::new(&plan.model, Simd::best()));
+        let designed = Designed::of(digitizer, &plan.model).expect("it digitized facets exactly");
         let surface = machined(&designed, &job.cutter, &path, rays, Simd::best())?;
         let (measures, known) = self.last.machined(&self.shaped, &surface, step)?;
         Ok(Made {
