@@ -83,8 +83,8 @@ pub(crate) trait Leaf: Sync + Send {
     ) -> u64;
 }
 
-/// Points in a leaf.
-pub(crate) const POINTS: usize = 16;
+/// Points in a leaf: two vectors of them.
+pub(crate) const POINTS: usize = 2 * LANES;
 
 /// A block of points, its free slots out of any reach.
 #[derive(Debug, Clone)]
@@ -114,6 +114,17 @@ impl PointLeaf {
         leaf
     }
 
+    /// Heights of eight of its points.
+    #[inline(always)]
+    fn half<S: Simd>(&self, simd: S, cutter: &Cutter, pose: &Pose, first: usize) -> f64x8<S> {
+        let eight = [
+            f64x8::from_slice(simd, &self.at[0][first..first + LANES]),
+            f64x8::from_slice(simd, &self.at[1][first..first + LANES]),
+            f64x8::from_slice(simd, &self.at[2][first..first + LANES]),
+        ];
+        heights(simd, cutter, pose, eight)
+    }
+
     #[inline(always)]
     fn point(&self, slot: usize) -> Point {
         [self.at[0][slot], self.at[1][slot], self.at[2][slot]]
@@ -141,23 +152,20 @@ impl Leaf for PointLeaf {
         (): &Self::Ceiling,
         best: &mut Best,
     ) -> u64 {
-        for first in (0..POINTS).step_by(LANES) {
-            let eight = [
-                f64x8::from_slice(simd, &self.at[0][first..first + LANES]),
-                f64x8::from_slice(simd, &self.at[1][first..first + LANES]),
-                f64x8::from_slice(simd, &self.at[2][first..first + LANES]),
-            ];
-            let all = heights(simd, cutter, pose, eight);
-            let mut high = all.simd_ge(best.height.max(f64::MIN)).to_bitmask();
-            while high != 0 {
-                let lane = high.trailing_zeros() as usize;
-                high &= high - 1;
-                let slot = first + lane;
-                let touch = Touch {
-                    height: all[lane],
-                    contact: self.point(slot),
-                };
-                best.raise(touch, self.ids[slot]);
+        let all = [
+            self.half(simd, cutter, pose, 0),
+            self.half(simd, cutter, pose, LANES),
+        ];
+        // One comparison for all of them: which of them are ahead, one after the other, nothing predicts.
+        let height = all[0].max(all[1]).reduce_max();
+        if height >= best.height.max(f64::MIN) {
+            let mut highest =
+                all[0].simd_eq(height).to_bitmask() | all[1].simd_eq(height).to_bitmask() << LANES;
+            while highest != 0 {
+                let slot = highest.trailing_zeros() as usize;
+                highest &= highest - 1;
+                let contact = self.point(slot);
+                best.raise(Touch { height, contact }, self.ids[slot]);
             }
         }
         self.count as u64
