@@ -1,7 +1,7 @@
 //! The section on output: what is written beside the path, its program and its report.
 
-use super::Source;
 use super::raw::RawJob;
+use super::source::Source;
 use crate::also::Also;
 use crate::error::Result;
 

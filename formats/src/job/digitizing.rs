@@ -3,8 +3,25 @@
 use horma_core::{Contact, Culling, Local, Method, Window};
 
 use super::raw::{Given, RawDigitizing, RawJob};
-use super::{CONTACTS, METHODS, Source};
+use super::source::Source;
 use crate::error::Result;
+
+pub(super) const CONTACTS: [(&str, Contact); 2] =
+    [("facet", Contact::Facet), ("point", Contact::Point)];
+const METHODS: [(&str, Method); 3] = [
+    ("exact", Method::Exact),
+    ("brute", Method::Brute),
+    ("local", Method::Local(LOCAL)),
+];
+/// The local search of a job that says no more.
+const LOCAL: Local = Local {
+    window: None,
+    culling: Culling {
+        back_faces: false,
+        beyond_reach: false,
+    },
+    fallback: true,
+};
 
 impl Source<'_> {
     /// Contact and method.

@@ -3,9 +3,13 @@
 use horma_core::{Axis, Cutter, Discretization, Job, Local, MachineAxis, Method};
 use serde_json::{Map, Value, json};
 
+use super::digitizing::CONTACTS;
+use super::discretization::COORDINATES;
 use super::machine::{LIMITS, Machine};
+use super::motion::KINDS;
+use super::part::TRIMMED;
 use super::program::{ANGLES, FEED_MODES, POINTS, UNITS};
-use super::{CONTACTS, COORDINATES, JobFile, KINDS, TRIMMED, last, passes};
+use super::{JobFile, last, passes};
 use crate::post::{Program, Split};
 
 impl JobFile {

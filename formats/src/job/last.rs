@@ -3,8 +3,8 @@
 use horma_core::{Choice, Frame, Grading, Hold, Landmark, Last, System};
 use serde_json::{Map, Value, json};
 
-use super::Source;
 use super::raw::{Given, RawGrading, RawJob};
+use super::source::Source;
 use crate::error::{Error, Result};
 
 /// Which foot a last is for.

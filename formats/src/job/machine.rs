@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 
 use horma_core::{AxisLimits, Limits, MachineAxis};
 
-use super::Source;
 use super::raw::{Given, RawAxisLimits, RawJob};
+use super::source::Source;
 use crate::error::Result;
 use crate::post::Program;
 

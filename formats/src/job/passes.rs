@@ -2,8 +2,9 @@
 
 use horma_core::{Error as Refused, Interval, Job, KeepOut, Motion, Section, Solid};
 
+use super::JobFile;
 use super::raw::{At, Given, RawJob, RawKeepOut, RawRoughing, RawStock};
-use super::{JobFile, Source};
+use super::source::Source;
 use crate::error::{Error, Result};
 
 /// How the stock is roughed before the finishing pass.

@@ -3,7 +3,8 @@
 use horma_core::MachineAxis;
 
 use super::raw::{At, Given, RawDecimals, RawJob, RawProgram, RawSplit};
-use super::{DEFAULT_CLEARANCE, DEFAULT_FEED, Source};
+use super::source::Source;
+use super::{DEFAULT_CLEARANCE, DEFAULT_FEED};
 use crate::error::Result;
 use crate::post::{
     Angles, Control, Counted, Dialect, FeedMode, Program, Programmed, Split, Units, Word,

@@ -1,4 +1,6 @@
-use horma_core::AxisLimits;
+use horma_core::{
+    AxisLimits, Contact, Coordinates, Cutter, Discretization, Method, Motion, MotionKind,
+};
 
 use super::*;
 use crate::post::{Angles, Control, FeedMode, Programmed, Split, Units};
