@@ -24,7 +24,7 @@ use horma_formats::{plot as diagram, sample};
 use crate::args::BenchKernel;
 use crate::error::Result;
 use crate::progress::{Audience, Display};
-use crate::{run, say};
+use crate::{pipeline, say};
 use measure::Subject;
 pub(crate) use scaling::scaling;
 use turns::Effort;
@@ -89,12 +89,12 @@ fn read(
 ) -> Result<(JobFile, String, Part)> {
     let (file, name, part) = match job {
         Some(path) => {
-            let run::Prepared {
+            let pipeline::Prepared {
                 part,
                 file,
                 warnings,
                 ..
-            } = run::read(path, overrides)?;
+            } = pipeline::read(path, overrides)?;
             for warning in warnings {
                 display.warn(&warning);
             }

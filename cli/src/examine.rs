@@ -10,7 +10,7 @@ use horma_formats::report::MachinedStatistics;
 
 use crate::error::Result;
 use crate::machined::Spacing;
-use crate::run::phase;
+use crate::pipeline::phase;
 use crate::{lasts, machined, verify};
 
 /// A path and what it is about.

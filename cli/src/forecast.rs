@@ -15,8 +15,9 @@ use serde::Serialize;
 
 use crate::args;
 use crate::error::Result;
+use crate::pipeline::{Prepared, read};
 use crate::progress::{Audience, Display, Event};
-use crate::run::{Prepared, check_divisible, read};
+use crate::run::check_divisible;
 use crate::{say, system};
 
 /// Runs of positions that are tried, spread over the job, and the length of each.

@@ -11,8 +11,8 @@ use tokio_util::sync::CancellationToken;
 use tracing::Span;
 
 use crate::error::{Error, Result};
+use crate::pipeline::{Computed, unless};
 use crate::progress::Display;
-use crate::run::{Computed, unless};
 use crate::{machined, system};
 
 /// Digitizes a part for one job after the other, beside the runtime, until `stop`.

@@ -11,7 +11,7 @@ use horma_formats::part::{self, Reading};
 use crate::args;
 use crate::error::{Error, Result};
 use crate::machined::{self, FOR_REPORT};
-use crate::{run, say, system};
+use crate::{pipeline, say, system};
 
 /// Puts the last that a job speaks of into the size and onto the side that are asked for; travels that the
 /// job gives go with it.
@@ -92,9 +92,9 @@ fn of_job(args: &args::Measure, job: &Path) -> Result<Lasts> {
     if overrides.side.is_none() && horma_formats::job::read(job, &overrides)?.last.is_none() {
         overrides.side = Some(Side::Right.name().to_owned());
     }
-    let run::Prepared {
+    let pipeline::Prepared {
         part, file, shaped, ..
-    } = run::read(job, &overrides)?;
+    } = pipeline::read(job, &overrides)?;
     let surface = match &args.path {
         None => None,
         Some(path) => {

@@ -6,6 +6,7 @@ mod args;
 mod error;
 
 mod passes;
+mod pipeline;
 mod program;
 mod results;
 mod run;

@@ -17,7 +17,7 @@ use horma_proto::VERSION;
 use crate::args;
 use crate::error::Result;
 use crate::examine::{Subject, examine};
-use crate::{run, say, system, verify};
+use crate::{pipeline, say, system, verify};
 
 /// How far rays are apart.
 #[derive(Debug, Clone, Copy)]
@@ -95,10 +95,10 @@ pub(crate) fn machined(args: &args::Machined) -> Result<()> {
         also: args.also.overrides(),
         ..args.made.overrides()
     };
-    let prepared = run::read(&args.job, &overrides)?;
+    let prepared = pipeline::read(&args.job, &overrides)?;
     let (part, file) = (&prepared.part, &prepared.file);
     output::prepare_dir_of(&args.output, output::of_machined)?;
-    let read = run::phase("read", begin);
+    let read = pipeline::phase("read", begin);
     let positions: Vec<Position> = rows.iter().map(csv::Row::position).collect();
     let subject = Subject {
         part,
@@ -121,7 +121,7 @@ pub(crate) fn machined(args: &args::Machined) -> Result<()> {
         Some(verify::check(part, &file.job, &positions, None, threads)?)
     };
     if verified.is_some() {
-        phases.push(run::phase("verify", begin));
+        phases.push(pipeline::phase("verify", begin));
     }
     let (verification, clearances) = verified.unzip();
     let found = examine(subject, rays, threads, &|_| {})?;
@@ -151,7 +151,7 @@ pub(crate) fn machined(args: &args::Machined) -> Result<()> {
         machined: found.surface.as_ref(),
     };
     let seen = view::view(&sheets, cutter, &waypoints, None, findings);
-    phases.push(run::phase("write", begin));
+    phases.push(pipeline::phase("write", begin));
     let report = Report {
         version: VERSION.to_owned(),
         job: prepared.job,

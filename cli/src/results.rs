@@ -16,8 +16,8 @@ use tokio_util::sync::CancellationToken;
 
 use crate::error::{Error, Result};
 use crate::passes::Passes;
+use crate::pipeline::{Asked, phase};
 use crate::progress::Display;
-use crate::run::{Asked, phase};
 use crate::{program, say, verify};
 
 /// What results are written of.

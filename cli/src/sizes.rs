@@ -18,8 +18,8 @@ use tokio_util::sync::CancellationToken;
 use crate::args;
 use crate::cluster::{self, Local, Workers};
 use crate::error::{Error, Result};
+use crate::pipeline::{Asked, carry_out, progress, stop_when_interrupted, unless};
 use crate::progress::{Audience, Display, Event};
-use crate::run::{Asked, carry_out, progress, stop_when_interrupted, unless};
 use crate::serve::{NOTICE, runtime};
 use crate::{here, say, system};
 

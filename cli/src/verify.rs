@@ -11,7 +11,7 @@ use horma_formats::job::JobFile;
 
 use crate::args;
 use crate::error::{Error, Result};
-use crate::{run, say, system};
+use crate::{pipeline, say, system};
 
 /// Verifies a path from a file.
 pub(crate) fn verify(args: &args::Verify) -> Result<()> {
@@ -35,7 +35,7 @@ pub(crate) fn read(
     made: &args::Made,
 ) -> Result<(Part, JobFile, Vec<Position>)> {
     let positions = csv::read(path)?.iter().map(csv::Row::position).collect();
-    let run::Prepared { part, file, .. } = run::read(job, &made.overrides())?;
+    let pipeline::Prepared { part, file, .. } = pipeline::read(job, &made.overrides())?;
     Ok((part, file, positions))
 }
 
