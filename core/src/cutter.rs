@@ -161,8 +161,9 @@ impl Cutter {
     /// part across the axis.
     pub fn least_bend(&self) -> f64 {
         match *self {
-            // √(m² − z²) bends by m²/(m² − z²)^(3/2), which is 1/m at least; m bends by 1/r at least, so
-            // that nothing is lost where the way goes along the axis as well.
+            // Along a way (x, y), G = √(m² − z²) bends by (m|m″|/G)·x² + (m′z·x − m·y)²/G³, which is least, over
+            // all x, with m³|m″|·y² / (G·(m|m″|G² + m′²z²)). Since m|m″| ≥ r²/(r² − d²) ≥ m′² that is y²/G or
+            // more, and G is at most R + r.
             Self::Torus { .. } => 1.0 / self.max_radius(),
             // Level along its rulings.
             Self::Cone { .. } => 0.0,
