@@ -12,6 +12,22 @@ use crate::cutter::Cutter;
 /// Lanes of a vector.
 pub(crate) const LANES: usize = 8;
 
+/// Some lanes of a vector, or of several side by side: a bit for each.
+pub(crate) type Lanes = u64;
+
+/// Their numbers, the lowest first.
+#[inline(always)]
+pub(crate) fn lanes(mut some: Lanes) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(
+        #[inline(always)]
+        move || {
+            let lane = (some != 0).then(|| some.trailing_zeros() as usize);
+            some &= some.wrapping_sub(1);
+            lane
+        },
+    )
+}
+
 /// m(d) of eight distances, and which of them are within the width.
 #[inline(always)]
 fn radii<S: Simd>(simd: S, cutter: &Cutter, d: f64x8<S>) -> (f64x8<S>, mask64x8<S>) {

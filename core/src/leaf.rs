@@ -8,8 +8,9 @@ use fearless_simd::{Simd, f64x8, prelude::*};
 use crate::bound::{Near, Plane, facet_bounds, load};
 use crate::contact::{Pose, touch_seen};
 use crate::cutter::Cutter;
-use crate::lanes::{LANES, heights};
+use crate::lanes::{LANES, heights, lanes};
 use crate::path::Touch;
+use crate::simd::Set;
 use crate::vector::{Interval, Point};
 
 /// The highest candidate found so far.
@@ -72,7 +73,7 @@ pub(crate) trait Leaf: Sync + Send {
 
     /// Raises `best` to the highest candidate; none is above the ceiling. Returns how many candidates
     /// were evaluated.
-    fn search<S: Simd>(
+    fn search<S: Set>(
         &self,
         simd: S,
         points: &[Point],
@@ -143,7 +144,7 @@ impl Leaf for PointLeaf {
     }
 
     #[inline(always)]
-    fn search<S: Simd>(
+    fn search<S: Set>(
         &self,
         simd: S,
         _: &[Point],
@@ -159,11 +160,9 @@ impl Leaf for PointLeaf {
         // One comparison for all of them: which of them are ahead, one after the other, nothing predicts.
         let height = all[0].max(all[1]).reduce_max();
         if height >= best.height.max(f64::MIN) {
-            let mut highest =
+            let highest =
                 all[0].simd_eq(height).to_bitmask() | all[1].simd_eq(height).to_bitmask() << LANES;
-            while highest != 0 {
-                let slot = highest.trailing_zeros() as usize;
-                highest &= highest - 1;
+            for slot in lanes(highest) {
                 let contact = self.point(slot);
                 best.raise(Touch { height, contact }, self.ids[slot]);
             }
@@ -258,7 +257,7 @@ impl Leaf for FacetLeaf {
     }
 
     #[inline(always)]
-    fn search<S: Simd>(
+    fn search<S: Set>(
         &self,
         simd: S,
         points: &[Point],
@@ -283,15 +282,15 @@ impl Leaf for FacetLeaf {
         if alive == 0 {
             return 0;
         }
-        let bounds = facet_bounds(simd, cutter, &near, corners).min(under);
+        let bounds = simd.piece(
+            #[inline(always)]
+            || facet_bounds(simd, cutter, &near, corners).min(under),
+        );
         let mut high = bounds.simd_ge(0.0).to_bitmask() & used;
         // The most promising one is solved first; it may rule out the others.
         while high != 0 {
             let mut highest = (f32::NEG_INFINITY, 0);
-            let mut rest = high;
-            while rest != 0 {
-                let slot = rest.trailing_zeros() as usize;
-                rest &= rest - 1;
+            for slot in lanes(high) {
                 if bounds[slot] > highest.0 {
                     highest = (bounds[slot], slot);
                 }

@@ -13,10 +13,10 @@ use crate::blocks::{Block, longest_side};
 use crate::bound::{Frame, Lids, Swing, View, lid_bounds, swung_lid_bounds};
 use crate::contact::Pose;
 use crate::cutter::Cutter;
-use crate::lanes::LANES;
+use crate::lanes::{LANES, Lanes, lanes};
 use crate::leaf::{Best, Leaf};
 use crate::record::Counters;
-use crate::simd::{Token, with_simd};
+use crate::simd::{Set, Token, with_simd};
 use crate::vector::{Interval, Point};
 
 /// The hierarchy.
@@ -94,7 +94,7 @@ impl<L: Leaf> Tree<L> {
     }
 
     #[inline(always)]
-    fn search_by<S: Simd>(
+    fn search_by<S: Set>(
         &self,
         simd: S,
         cutter: &Cutter,
@@ -123,7 +123,7 @@ impl<L: Leaf> Tree<L> {
 
     /// Raises the `best` of each active position to the highest of all candidates.
     #[inline(always)]
-    fn raise<S: Simd>(
+    fn raise<S: Set>(
         &self,
         simd: S,
         cutter: &Cutter,
@@ -197,22 +197,6 @@ impl<L: Leaf> Tree<L> {
     }
 }
 
-/// Some of eight positions.
-type Lanes = u64;
-
-/// Their numbers.
-#[inline(always)]
-fn lanes(mut some: Lanes) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(
-        #[inline(always)]
-        move || {
-            let lane = (some != 0).then(|| some.trailing_zeros() as usize);
-            some &= some.wrapping_sub(1);
-            lane
-        },
-    )
-}
-
 /// What is known before a search.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Start {
@@ -277,15 +261,13 @@ impl Stack {
         &mut self,
         simd: S,
         bounds: &[[f32; LANES]; LANES],
-        mut high: u64,
+        high: Lanes,
         heights: &[f32; LANES],
         children: &[u32; LANES],
     ) {
         let heights = f32x8::from_slice(simd, heights);
         let (mut highest, mut promise) = (self.len, f32::NEG_INFINITY);
-        while high != 0 {
-            let slot = high.trailing_zeros() as usize;
-            high &= high - 1;
+        for slot in lanes(high) {
             let mut own = [0.0; LANES];
             for lane in 0..LANES {
                 own[lane] = bounds[lane][slot];

@@ -151,12 +151,12 @@ mod tests {
     use super::super::tests::{cutter, pose};
     use super::*;
     use crate::contact::touch_facet;
-    use crate::simd::{Simd as Level, with_simd};
+    use crate::simd::{Set, Simd as Level, with_simd};
     use crate::vector::{add_scaled, sub};
     use proptest::prelude::*;
 
     #[inline(always)]
-    fn facets<S: Simd>(
+    fn facets<S: Set>(
         simd: S,
         cutter: &Cutter,
         near: &Near,
@@ -167,7 +167,10 @@ mod tests {
             load(simd, &corners[1]),
             load(simd, &corners[2]),
         ];
-        *facet_bounds(simd, cutter, near, corners)
+        simd.piece(
+            #[inline(always)]
+            || *facet_bounds(simd, cutter, near, corners),
+        )
     }
 
     proptest! {

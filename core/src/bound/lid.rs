@@ -8,6 +8,7 @@ use super::{Eight, Slopes, dot3, load, turn};
 use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::LANES;
+use crate::simd::Set;
 use crate::vector::{Interval, Point, add_scaled, dot, length, sub};
 
 /// Where the lids of a tree are: what rounding has to be measured by.
@@ -150,20 +151,16 @@ impl View {
 /// Upper bounds of F under lids, minus infinity where nothing can be in reach. `place` is where on the
 /// cutter, `(d, z)`, the highest touch is expected.
 #[inline(always)]
-pub(crate) fn lid_bounds<S: Simd>(
+pub(crate) fn lid_bounds<S: Set>(
     simd: S,
     cutter: &Cutter,
     view: &View,
     place: [f32; 2],
     lids: &Lids,
 ) -> f32x8<S> {
-    let under = Under::new(simd, cutter, view, place, lids);
-    let z = under.middle[2];
-    let circle = under.circle(under.radius);
-    let near = under.near(under.radius, z, 0.0);
-    near.select(
-        under.tangent.min(circle),
-        f32x8::splat(simd, f32::NEG_INFINITY),
+    simd.piece(
+        #[inline(always)]
+        || Under::new(simd, cutter, view, place, lids).bounds(simd),
     )
 }
 
@@ -193,7 +190,7 @@ impl Swing {
 /// Upper bounds of F under lids for each of several positions, by the tangent planes of one of them: each
 /// sees the lids turned over the same planes, which F falls below where they have moved away.
 #[inline(always)]
-pub(crate) fn swung_lid_bounds<S: Simd>(
+pub(crate) fn swung_lid_bounds<S: Set>(
     simd: S,
     cutter: &Cutter,
     views: &[View; LANES],
@@ -202,25 +199,13 @@ pub(crate) fn swung_lid_bounds<S: Simd>(
     place: [f32; 2],
     lids: &Lids,
 ) -> [f32x8<S>; LANES] {
-    let under = Under::new(simd, cutter, &views[from], place, lids);
-    let [_, y, z] = under.middle;
-    let [chord, travel] = swing.most;
-    let radius = under.radius + (y.abs() + z.abs()) * chord;
-    let circle = under.circle(radius);
-    let near = under.near(radius, z, travel);
-    let bend = 0.5 * cutter.least_bend() as f32;
-    let middle = load(simd, &lids.middle);
-    let nothing = f32x8::splat(simd, f32::NEG_INFINITY);
-    let mut bounds = [nothing; LANES];
-    for (bound, view) in bounds.iter_mut().zip(views) {
-        let seen = turn(middle, view.cos, view.sin, [-view.x, 0.0, 0.0]);
-        let over = under.slopes.over(seen) + under.slopes.rise_over(simd, view, lids);
-        let away = ((seen[2] - under.slopes.z).abs() - under.radius).max(0.0);
-        let tangent = over - away * away * bend;
-        // As much again is for the rounding of these few.
-        *bound = near.select((tangent + under.lost * 2.0).min(circle), nothing);
-    }
-    bounds
+    simd.piece(
+        #[inline(always)]
+        || {
+            let under = Under::new(simd, cutter, &views[from], place, lids);
+            under.swung_bounds(simd, views, swing, lids)
+        },
+    )
 }
 
 /// Lids as one position sees them.
@@ -269,6 +254,44 @@ impl<'a, S: Simd> Under<'a, S> {
             tangent: tangent + lost,
             lost,
         }
+    }
+
+    /// Upper bounds for that position.
+    #[inline(always)]
+    fn bounds(&self, simd: S) -> f32x8<S> {
+        let circle = self.circle(self.radius);
+        let near = self.near(self.radius, self.middle[2], 0.0);
+        let nothing = f32x8::splat(simd, f32::NEG_INFINITY);
+        near.select(self.tangent.min(circle), nothing)
+    }
+
+    /// Upper bounds for others that are no further away than `swing` says.
+    #[inline(always)]
+    fn swung_bounds(
+        &self,
+        simd: S,
+        views: &[View; LANES],
+        swing: &Swing,
+        lids: &Lids,
+    ) -> [f32x8<S>; LANES] {
+        let [_, y, z] = self.middle;
+        let [chord, travel] = swing.most;
+        let radius = self.radius + (y.abs() + z.abs()) * chord;
+        let circle = self.circle(radius);
+        let near = self.near(radius, z, travel);
+        let bend = 0.5 * self.cutter.least_bend() as f32;
+        let middle = load(simd, &lids.middle);
+        let nothing = f32x8::splat(simd, f32::NEG_INFINITY);
+        let mut bounds = [nothing; LANES];
+        for (bound, view) in bounds.iter_mut().zip(views) {
+            let seen = turn(middle, view.cos, view.sin, [-view.x, 0.0, 0.0]);
+            let over = self.slopes.over(seen) + self.slopes.rise_over(simd, view, lids);
+            let away = ((seen[2] - self.slopes.z).abs() - self.radius).max(0.0);
+            let tangent = over - away * away * bend;
+            // As much again is for the rounding of these few.
+            *bound = near.select((tangent + self.lost * 2.0).min(circle), nothing);
+        }
+        bounds
     }
 
     /// Whether the cutter may reach what is within a radius about the middles, seen along the spindle,
@@ -336,7 +359,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[inline(always)]
-    fn lids<S: Simd>(
+    fn lids<S: Set>(
         simd: S,
         cutter: &Cutter,
         view: &View,
@@ -347,7 +370,7 @@ mod tests {
     }
 
     #[inline(always)]
-    fn swung<S: Simd>(
+    fn swung<S: Set>(
         simd: S,
         cutter: &Cutter,
         views: &[View; LANES],
