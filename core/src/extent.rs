@@ -217,13 +217,8 @@ pub(crate) mod tests {
             discretization: Discretization::Tolerance(0.1),
             cutter: Cutter::ball(radius).expect("valid"),
             motion: Motion {
-                kind: MotionKind::Helix,
-                step: 3.0,
-                points_per_revolution: 40,
-                from: None,
-                to: None,
                 path_tolerance,
-                lead: [0.0; 2],
+                ..Motion::new(MotionKind::Helix, 3.0, 40)
             },
             coordinates: Coordinates::Double,
             contact: Contact::Point,

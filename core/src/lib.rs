@@ -40,13 +40,9 @@
 //!     discretization: Discretization::Tolerance(0.01),
 //!     cutter: Cutter::torus(40.0, 8.0)?,
 //!     motion: Motion {
-//!         kind: MotionKind::Helix,
-//!         step: 1.0,
-//!         points_per_revolution: 90,
 //!         from: Some(-30.0),
 //!         to: Some(30.0),
-//!         lead: [0.0; 2],
-//!         path_tolerance: None,
+//!         ..Motion::new(MotionKind::Helix, 1.0, 90)
 //!     },
 //!     coordinates: Coordinates::Double,
 //!     contact: Contact::Facet,

@@ -119,6 +119,19 @@ const MIN_PATH_TOLERANCE: f64 = 1.0e-6;
 const MAX_POSITIONS: f64 = 1.0e15;
 
 impl Motion {
+    /// Over the whole part and no further, with nobody looking at the moves.
+    pub const fn new(kind: MotionKind, step: f64, points_per_revolution: u32) -> Self {
+        Self {
+            kind,
+            step,
+            points_per_revolution,
+            from: None,
+            to: None,
+            path_tolerance: None,
+            lead: [0.0; 2],
+        }
+    }
+
     /// Checks what can be checked without a part.
     ///
     /// # Errors
@@ -275,13 +288,9 @@ mod tests {
 
     fn motion(kind: MotionKind) -> Motion {
         Motion {
-            kind,
-            step: 2.0,
-            points_per_revolution: 4,
             from: Some(0.0),
             to: Some(4.0),
-            path_tolerance: None,
-            lead: [0.0; 2],
+            ..Motion::new(kind, 2.0, 4)
         }
     }
 

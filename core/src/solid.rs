@@ -183,13 +183,9 @@ mod tests {
                 },
             };
             let motion = Motion {
-                kind: MotionKind::Helix,
-                step: 1.7,
-                points_per_revolution: 97,
                 from: Some(-25.0),
                 to: Some(35.0),
-                path_tolerance: None,
-                lead: [0.0; 2],
+                ..Motion::new(MotionKind::Helix, 1.7, 97)
             };
             let job = Job {
                 discretization: Discretization::Tolerance(0.01),

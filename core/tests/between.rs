@@ -44,13 +44,10 @@ fn job(kind: MotionKind, path_tolerance: Option<f64>) -> Job {
         discretization: Discretization::Tolerance(0.1),
         cutter: Cutter::cylinder(WHEEL, 8.0).expect("valid"),
         motion: Motion {
-            kind,
-            step: 5.0,
-            points_per_revolution: 13,
             from: Some(10.0),
             to: Some(60.0),
             path_tolerance,
-            lead: [0.0; 2],
+            ..Motion::new(kind, 5.0, 13)
         },
         coordinates: Coordinates::Double,
         contact: Contact::Facet,

@@ -118,15 +118,7 @@ fn a_lid_that_bends_outward_is_not_skipped_where_the_cutter_is_level() {
             job: Job {
                 discretization: Discretization::Tolerance(0.1),
                 cutter: Cutter::torus(0.5, 0.002).expect("valid"),
-                motion: Motion {
-                    kind: MotionKind::Helix,
-                    step,
-                    points_per_revolution: 7,
-                    from: None,
-                    to: None,
-                    path_tolerance: None,
-                    lead: [0.0; 2],
-                },
+                motion: Motion::new(MotionKind::Helix, step, 7),
                 coordinates: Coordinates::Double,
                 contact: Contact::Facet,
                 method: Method::Exact,

@@ -49,13 +49,9 @@ fn plan(method: Method) -> Plan {
         },
         cutter: Cutter::torus(40.0, 8.0).expect("valid"),
         motion: Motion {
-            kind: MotionKind::Helix,
-            step: 2.0,
-            points_per_revolution: 72,
             from: Some(0.0),
             to: Some(100.0),
-            path_tolerance: None,
-            lead: [0.0; 2],
+            ..Motion::new(MotionKind::Helix, 2.0, 72)
         },
         coordinates: Coordinates::Double,
         contact: Contact::Point,

@@ -68,13 +68,9 @@ mod tests {
             }],
         };
         let motion = Motion {
-            kind: MotionKind::Helix,
-            step: 5.0,
-            points_per_revolution: 4,
             from: Some(0.0),
             to: Some(10.0),
-            path_tolerance: None,
-            lead: [0.0; 2],
+            ..Motion::new(MotionKind::Helix, 5.0, 4)
         };
         let extent = Interval {
             low: 0.0,

@@ -112,13 +112,10 @@ static PLANNED: LazyLock<(Handout, Extent)> = LazyLock::new(|| {
             minor_radius: 1.0,
         },
         motion: Motion {
-            kind: MotionKind::Helix,
-            step: 1.0,
-            points_per_revolution: 4,
             from: Some(0.0),
             to: Some(4.0),
             path_tolerance: Some(0.1),
-            lead: [0.0; 2],
+            ..Motion::new(MotionKind::Helix, 1.0, 4)
         },
         coordinates: Coordinates::Double,
         contact: Contact::Facet,

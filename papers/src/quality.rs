@@ -162,13 +162,9 @@ impl Subject {
             discretization: Discretization::Tolerance(TOLERANCE),
             cutter: Cutter::torus(RADII[0], RADII[1])?,
             motion: Motion {
-                kind: MotionKind::Helix,
-                step,
-                points_per_revolution,
                 from: Some(long.low - RADII[1]),
                 to: Some(long.high + RADII[1]),
-                path_tolerance: None,
-                lead: [0.0; 2],
+                ..Motion::new(MotionKind::Helix, step, points_per_revolution)
             },
             coordinates: Coordinates::Double,
             contact: Contact::Facet,

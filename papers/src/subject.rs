@@ -62,15 +62,11 @@ impl Subject {
         let job = Job {
             discretization,
             cutter: Cutter::torus(major, minor)?,
-            motion: Motion {
-                kind: MotionKind::Helix,
-                step: turning.step,
-                points_per_revolution: turning.points_per_revolution,
-                from: None,
-                to: None,
-                path_tolerance: None,
-                lead: [0.0; 2],
-            },
+            motion: Motion::new(
+                MotionKind::Helix,
+                turning.step,
+                turning.points_per_revolution,
+            ),
             coordinates: Coordinates::Double,
             contact: Contact::Point,
             method: Method::Exact,

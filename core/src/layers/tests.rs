@@ -51,15 +51,7 @@ fn digitized(part: &Part, cutter: Cutter, motion: Motion) -> ToolPath {
     digitizer.path(&plan.trajectory).0
 }
 
-const MOTION: Motion = Motion {
-    kind: MotionKind::Helix,
-    step: 5.0,
-    points_per_revolution: 72,
-    from: None,
-    to: None,
-    path_tolerance: None,
-    lead: [0.0; 2],
-};
+const MOTION: Motion = Motion::new(MotionKind::Helix, 5.0, 72);
 
 const EVERYWHERE: Interval = Interval {
     low: f64::NEG_INFINITY,

@@ -616,18 +616,14 @@ fn motion(dice: &mut Dice, part: &Part, cutter: &Cutter) -> Motion {
     };
     let length = (to.unwrap_or(high + w) - from.unwrap_or(low - w)).max(1.0e-5);
     let step = length / revolutions;
+    let kind = *dice.pick(&[MotionKind::Helix, MotionKind::Rings]);
+    let step = match dice.below(3) {
+        0 => eighths(step).max(0.125),
+        _ => step.max(1.0e-6),
+    };
     Motion {
-        kind: *dice.pick(&[MotionKind::Helix, MotionKind::Rings]),
-        step: if dice.below(3) == 0 {
-            eighths(step).max(0.125)
-        } else {
-            step
-        }
-        .max(1.0e-6),
-        points_per_revolution,
         from,
         to,
-        path_tolerance: None,
-        lead: [0.0; 2],
+        ..Motion::new(kind, step, points_per_revolution)
     }
 }

@@ -204,13 +204,8 @@ pub fn trajectory_from_wire(t: Option<&wire::Trajectory>) -> Result<Trajectory> 
     let t = t.ok_or(missing("task", "a trajectory"))?;
     let kind = kind_from_wire(t.kind())?;
     let motion = Motion {
-        kind,
-        step: t.step,
-        points_per_revolution: t.points_per_revolution,
         from: Some(t.from),
-        to: None,
-        path_tolerance: None,
-        lead: [0.0; 2],
+        ..Motion::new(kind, t.step, t.points_per_revolution)
     };
     motion.validate()?;
     Ok(Trajectory {
@@ -270,13 +265,8 @@ mod tests {
             },
             cutter,
             motion: Motion {
-                kind: MotionKind::Rings,
-                step: 2.0,
-                points_per_revolution: 360,
-                from: None,
                 to: Some(12.5),
-                path_tolerance: None,
-                lead: [0.0; 2],
+                ..Motion::new(MotionKind::Rings, 2.0, 360)
             },
             coordinates: Coordinates::Double,
             contact: Contact::Facet,
