@@ -3,7 +3,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::{Process, job, report, run, sample, scratch, succeed, text, texts, wait_until};
+use crate::common::{
+    Process, events, job, report, run, sample, scratch, succeed, text, texts, wait_until,
+};
 use serde_json::Value;
 
 /// A coarse job of the sample last, with its own copy of the part.
@@ -15,11 +17,6 @@ fn coarse(dir: &Path, step: f64) -> PathBuf {
          [motion]\nstep = {step}\npoints_per_revolution = 36\n"
     );
     job(dir, "job.toml", &[&part], &more)
-}
-
-fn events(out: &str) -> Vec<Value> {
-    let parse = |line: &str| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line}"));
-    out.lines().map(parse).collect()
 }
 
 #[test]
@@ -57,16 +54,20 @@ fn a_dry_run_tells_what_a_run_does_and_writes_nothing() {
 
     succeed(&["run", text(&job), "-o", text(&out), "-w", "3", "-q"]);
     let report = report(&out);
-    assert_eq!(plan["positions"], report["path"]["positions"]);
+    let passes = plan["passes"].as_array().expect("passes");
+    let [pass] = &passes[..] else {
+        panic!("not one pass: {passes:?}");
+    };
+    assert_eq!(pass["positions"], report["path"]["positions"]);
     assert_eq!(plan["bodies"], report["bodies"]);
-    let extents = plan["extents"].as_array().expect("extents");
+    let extents = pass["extents"].as_array().expect("extents");
     let made = report["extents"].as_array().expect("extents");
     let positions = |all: &[Value]| -> Vec<u64> {
         let of = |e: &Value| e["positions"].as_u64().expect("a number");
         all.iter().map(of).collect()
     };
     assert_eq!(positions(extents), positions(made));
-    assert!(plan["seconds"]["digitize"].as_f64().expect("a time") > 0.0);
+    assert!(pass["seconds"]["digitize"].as_f64().expect("a time") > 0.0);
 }
 
 #[test]

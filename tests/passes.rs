@@ -4,7 +4,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::common::{Process, master, report, run, sample, scratch, succeed, text, texts, worker};
+use crate::common::{
+    Process, events, master, report, run, sample, scratch, succeed, text, texts, worker,
+};
 
 const PASSES: &str = "
 [stock]
@@ -185,6 +187,18 @@ fn layers_lead_to_the_path_and_the_program_runs_them_in_order() {
     assert!((retract - corner - 20.0).abs() < 1e-3, "{retract}");
 
     let told = report(&out);
+    let forecast = succeed(&["run", text(&passes), "--dry-run", "--json"]);
+    let forecast = events(&forecast);
+    let forecast = &forecast.last().expect("a plan")["plan"]["passes"];
+    let positions_of = |pass: usize| forecast[pass]["positions"].as_u64();
+    assert_eq!(
+        (&forecast[0]["name"], &forecast[1]["name"]),
+        (&"rough".into(), &"finish".into())
+    );
+    assert_eq!(positions_of(1), told["path"]["positions"].as_u64());
+    // The allowance makes the cutter wider, and the roughing's steps are longer.
+    assert!(positions_of(0) < positions_of(1), "{forecast}");
+
     let figures = told["program"]["passes"]
         .as_array()
         .expect("passes")

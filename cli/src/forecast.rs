@@ -37,23 +37,35 @@ pub(crate) struct Forecast {
     files: Vec<PathBuf>,
     warnings: Vec<String>,
     bodies: Vec<BodyRecord>,
-    positions: u64,
-    points_per_revolution: u32,
-    /// First and last travel, mm.
-    travel: [f64; 2],
     memory: Memory,
     /// 0: in this process.
     workers: u32,
     distribution: &'static str,
-    extents: Vec<Share>,
-    seconds: Seconds,
+    threads: usize,
+    /// Reading the part off its surfaces, as it took just now, s.
+    discretize: f64,
+    /// In the order in which they are computed.
+    passes: Vec<Pass>,
 }
 
 /// Bytes.
 #[derive(Debug, Serialize)]
 struct Memory {
+    /// By the pass that needs most.
     needed: u64,
     available: u64,
+}
+
+/// One computation of heights: for the finishing pass, or for what a roughing aims at.
+#[derive(Debug, Serialize)]
+struct Pass {
+    name: &'static str,
+    positions: u64,
+    points_per_revolution: u32,
+    /// First and last travel, mm.
+    travel: [f64; 2],
+    extents: Vec<Share>,
+    seconds: Seconds,
 }
 
 /// What a worker would get.
@@ -72,16 +84,16 @@ struct Share {
 /// How long it takes, s.
 #[derive(Debug, Serialize)]
 struct Seconds {
-    /// As it took just now.
-    discretize: f64,
     /// As it took just now, in one process.
     build: f64,
-    /// On so many threads; nothing if it cannot be told from a few positions.
+    /// On all threads; nothing if it cannot be told from a few positions.
     digitize: Option<f64>,
-    threads: usize,
     /// Positions that were tried for it.
     tried: u64,
 }
+
+/// The passes of a job; one without a roughing has the last one.
+const PASSES: [&str; 2] = ["rough", "finish"];
 
 /// Tells what a run would do.
 pub(crate) fn tell(args: &args::Run) -> Result<()> {
@@ -105,6 +117,7 @@ fn forecast(args: &args::Run, display: &Display) -> Result<Forecast> {
         warnings,
         ..
     } = read(&args.job.file, &args.job.how.overrides(args.workers))?;
+    let targets = file.targets()?;
     let JobFile { job, cluster, .. } = &file;
     let available = system::memory();
     let distribution = match cluster.workers {
@@ -114,54 +127,80 @@ fn forecast(args: &args::Run, display: &Display) -> Result<Forecast> {
             cluster.sharing.distribution
         }
     };
-    let needed = Handout::predict(&part, job, distribution, available, true)?;
+    let mut needed = 0;
+    for job in &targets {
+        needed = Handout::predict(&part, job, distribution, available, true)?.max(needed);
+    }
     display.tell("discretize", 0, 0);
     let begin = Instant::now();
-    let plan = Plan::new(&part, *job, available)?;
+    let mut model = Plan::new(&part, *job, available)?.model;
     let discretize = begin.elapsed().as_secs_f64();
 
-    let simd = args.simd.unwrap_or_else(Simd::best);
     let threads = match (cluster.workers, args.threads.map(usize::from)) {
         (0, threads) => threads.unwrap_or_else(system::cores),
         (workers, threads) => (workers as usize * threads.unwrap_or(1)).min(system::cores()),
     };
+    let simd = args.simd.unwrap_or_else(Simd::best);
+    let parts = cluster.workers * cluster.sharing.extents_per_worker;
+    let names = &PASSES[PASSES.len() - targets.len()..];
+    let mut passes = Vec::new();
+    for (name, job) in names.iter().zip(targets) {
+        let plan = Plan::over(model, job, available)?;
+        passes.push(pass(name, &plan, parts, threads, simd, display)?);
+        model = plan.model;
+    }
+    Ok(Forecast {
+        files: file.files.clone(),
+        warnings,
+        bodies: model.bodies,
+        memory: Memory { needed, available },
+        workers: cluster.workers,
+        distribution: distribution.name(),
+        threads,
+        discretize,
+        passes,
+    })
+}
+
+/// What a plan would be in so many `parts`, by a few of its positions that are tried.
+fn pass(
+    name: &'static str,
+    plan: &Plan,
+    parts: u32,
+    threads: usize,
+    simd: Simd,
+    display: &Display,
+) -> Result<Pass> {
     display.tell("build", 0, 0);
     let begin = Instant::now();
-    let digitizer = system::pool(threads)?.install(|| Digitizer::new(job, &plan.model.rows, simd));
+    let build = || Digitizer::new(&plan.job, &plan.model.rows, simd);
+    let digitizer = system::pool(threads)?.install(build);
     let build = begin.elapsed().as_secs_f64();
     let total = plan.trajectory.positions;
-    let (digitize, tried) = match job.method {
+    let (digitize, tried) = match plan.job.method {
         Method::Local(local) if local.needs_whole_path() => (None, 0),
         Method::Exact | Method::Brute | Method::Local(_) => {
             display.tell("try", 0, 0);
-            let (each, tried) = system::pool(1)?.install(|| attempt(&digitizer, &plan));
+            let (each, tried) = system::pool(1)?.install(|| attempt(&digitizer, plan));
             (Some(each * total as f64 / threads as f64), tried)
         }
     };
-    let parts = cluster.workers * cluster.sharing.extents_per_worker;
     let extents = if parts == 0 {
         Vec::new()
     } else {
         plan.split(parts)
     };
-    Ok(Forecast {
-        files: file.files.clone(),
-        warnings,
+    Ok(Pass {
+        name,
         positions: total,
         points_per_revolution: plan.trajectory.points_per_revolution,
-        travel: travel(&plan, 0, total),
-        memory: Memory { needed, available },
-        workers: cluster.workers,
-        distribution: distribution.name(),
-        extents: extents.iter().map(|e| share(&plan, e)).collect(),
+        travel: travel(plan, 0, total),
+        extents: extents.iter().map(|e| share(plan, e)).collect(),
         seconds: Seconds {
-            discretize,
             build,
             digitize,
-            threads,
             tried,
         },
-        bodies: plan.model.bodies,
     })
 }
 
@@ -220,12 +259,6 @@ impl fmt::Display for Forecast {
                 body.name, body.facets
             )?;
         }
-        let [from, to] = self.travel;
-        writeln!(
-            f,
-            "{} positions, {} a revolution, travel {from:.3} to {to:.3} mm",
-            self.positions, self.points_per_revolution
-        )?;
         let mb = |bytes: u64| bytes as f64 / 1e6;
         writeln!(
             f,
@@ -233,48 +266,61 @@ impl fmt::Display for Forecast {
             mb(self.memory.needed),
             mb(self.memory.available)
         )?;
-        if self.workers > 0 {
+        let (threads, discretize) = (self.threads, self.discretize);
+        writeln!(f, "time: discretize {discretize:.2} s")?;
+        for pass in &self.passes {
+            let [from, to] = pass.travel;
             writeln!(
                 f,
-                "{} workers, distribution {}, {} extents:",
-                self.workers,
-                self.distribution,
-                self.extents.len()
+                "{}: {} positions, {} a revolution, travel {from:.3} to {to:.3} mm",
+                pass.name, pass.positions, pass.points_per_revolution
             )?;
-            writeln!(
-                f,
-                "extent   positions  travel, mm               rows   of these halo      points"
-            )?;
-            for (i, e) in self.extents.iter().enumerate() {
-                let travel = format!("{:.3} to {:.3}", e.travel[0], e.travel[1]);
-                writeln!(
+            let Seconds {
+                build,
+                digitize,
+                tried,
+            } = &pass.seconds;
+            write!(f, "time: build {build:.2} s, digitize ")?;
+            match digitize {
+                Some(seconds) => writeln!(
                     f,
-                    "{i:>6} {:>11}  {travel:<22} {:>6} {:>15} {:>11}",
-                    e.positions, e.rows, e.halo, e.points
-                )?;
+                    "about {seconds:.2} s on {threads} threads (by {tried} positions that were tried)"
+                )?,
+                None => writeln!(f, "unknown: this method goes over the whole path first")?,
             }
-        }
-        let Seconds {
-            discretize,
-            build,
-            digitize,
-            threads,
-            tried,
-        } = &self.seconds;
-        write!(
-            f,
-            "time: discretize {discretize:.2} s, build {build:.2} s, digitize "
-        )?;
-        match digitize {
-            Some(seconds) => writeln!(
-                f,
-                "about {seconds:.2} s on {threads} threads (by {tried} positions that were tried)"
-            )?,
-            None => writeln!(f, "unknown: this method goes over the whole path first")?,
+            if self.workers > 0 {
+                self.write_extents(f, &pass.extents)?;
+            }
         }
         writeln!(
             f,
             "verification, measuring and writing come on top; nothing was written"
         )
+    }
+}
+
+impl Forecast {
+    /// What each worker would get.
+    fn write_extents(&self, f: &mut fmt::Formatter<'_>, extents: &[Share]) -> fmt::Result {
+        writeln!(
+            f,
+            "{} workers, distribution {}, {} extents:",
+            self.workers,
+            self.distribution,
+            extents.len()
+        )?;
+        writeln!(
+            f,
+            "extent   positions  travel, mm               rows   of these halo      points"
+        )?;
+        for (i, e) in extents.iter().enumerate() {
+            let travel = format!("{:.3} to {:.3}", e.travel[0], e.travel[1]);
+            writeln!(
+                f,
+                "{i:>6} {:>11}  {travel:<22} {:>6} {:>15} {:>11}",
+                e.positions, e.rows, e.halo, e.points
+            )?;
+        }
+        Ok(())
     }
 }

@@ -12,6 +12,8 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
+use serde_json::Value;
+
 /// Far longer than anything takes: a test that waits this long has failed.
 const DEADLINE: Duration = Duration::from_secs(120);
 
@@ -49,6 +51,29 @@ pub fn succeed(args: &[&str]) -> String {
 pub fn texts(output: &Output) -> (String, String) {
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (text(&output.stdout), text(&output.stderr))
+}
+
+/// What `--json` told, event by event.
+pub fn events(told: &str) -> Vec<Value> {
+    let parse = |line: &str| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line}"));
+    told.lines().map(parse).collect()
+}
+
+/// What sends a job to a master and waits for its path, which nobody holds against the part: that would be
+/// most of the work.
+pub fn submission<'a>(job: &'a Path, master: &'a str, out: &'a Path) -> Vec<&'a str> {
+    let (job, out) = (text(job), text(out));
+    let words = [
+        "submit",
+        job,
+        "--master",
+        master,
+        "-q",
+        "--no-verify",
+        "-o",
+        out,
+    ];
+    words.to_vec()
 }
 
 /// A scratch directory.
@@ -136,7 +161,7 @@ pub fn lower(path: &Path, lowered: &Path) -> [f64; 2] {
 }
 
 /// `report.json` of a directory.
-pub fn report(dir: &Path) -> serde_json::Value {
+pub fn report(dir: &Path) -> Value {
     let text = std::fs::read(dir.join("report.json")).expect("a report");
     serde_json::from_slice(&text).expect("JSON")
 }
