@@ -49,10 +49,11 @@ pub(crate) fn run(
     display: &Display,
     stop: &CancellationToken,
 ) -> Result<(Outcome, Option<Designed>)> {
-    system::pool(threads)?.install(|| pipeline(part, job, simd, display, stop))
+    system::pool(threads)?.install(|| plan_and_digitize(part, job, simd, display, stop))
 }
 
-fn pipeline(
+/// The same on the current thread pool.
+fn plan_and_digitize(
     part: &Part,
     job: Job,
     simd: Simd,
