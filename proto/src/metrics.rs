@@ -244,7 +244,7 @@ pub fn announce(role: Role) {
             match metric.kind {
                 Kind::Counter => metric.add(value, 0),
                 Kind::Gauge => metric.set(value, 0.0),
-                Kind::Histogram => {}
+                Kind::Histogram => metric.open(value),
             }
         }
     }
@@ -270,6 +270,11 @@ impl Metric {
     /// Writes down one more of a histogram.
     pub fn record(&self, value: &'static str, what: f64) {
         histogram!(self.name, self.labels(value)).record(what);
+    }
+
+    /// A histogram of nothing yet.
+    fn open(&self, value: &'static str) {
+        let _ = histogram!(self.name, self.labels(value));
     }
 
     fn labels(&self, value: &'static str) -> Vec<Label> {
