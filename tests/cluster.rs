@@ -4,7 +4,9 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use crate::common::{Process, data, job, master, path_of, report, run, sample, scratch, succeed};
+use crate::common::{
+    Process, data, job, master, path_of, report, run, sample, scratch, submission, succeed,
+};
 use crate::common::{text, texts, worker};
 use serde_json::Value;
 
@@ -369,17 +371,8 @@ fn a_cluster_made_by_hand_gives_the_same_bytes() {
         let distribution = name.split(' ').next().expect("a word");
         let out = dir.path().join(name);
         let sample = sample();
-        succeed(&[
-            "submit",
-            text(&sample),
-            "--master",
-            &address,
-            "-o",
-            text(&out),
-            "--distribution",
-            distribution,
-            "-q",
-        ]);
+        let submit = submission(&sample, &address, &out);
+        succeed(&[&submit[..], &["--distribution", distribution]].concat());
         assert!(std::fs::read(out.join("path.csv")).expect("a path") == alone);
         let report = report(&out);
         let workers: Vec<_> = report["workers"]

@@ -6,7 +6,9 @@ mod slow;
 
 use std::path::{Path, PathBuf};
 
-use crate::common::{Process, brute_job, data, master, path_of, report, sample, scratch, text};
+use crate::common::{
+    Process, brute_job, data, master, path_of, report, sample, scratch, submission, text,
+};
 use crate::common::{wait_until, worker};
 use horma_proto::wire::digitize_reply::Kind;
 use horma_proto::wire::master_client::MasterClient;
@@ -26,8 +28,7 @@ fn long_job_of(dir: &Path, part: &Path, contact: &str) -> PathBuf {
 }
 
 fn submit(job: &Path, master: &str, out: &Path) -> Process {
-    let args = ["submit", text(job), "--master", master, "-o", text(out)];
-    Process::start("submit", &args, "error")
+    Process::start("submit", &submission(job, master, out), "error")
 }
 
 #[test]

@@ -6,7 +6,8 @@ mod look;
 use std::path::{Path, PathBuf};
 
 use crate::common::{
-    Process, horma, path_of, report, run, sample, scratch, succeed, text, texts, wait_until,
+    Process, horma, path_of, report, run, sample, scratch, submission, succeed, text, texts,
+    wait_until,
 };
 use horma_proto::tls::{Role, Tls};
 use horma_proto::transport::{connect, endpoint};
@@ -95,8 +96,7 @@ fn a_cluster_with_certificates_gives_the_same_bytes() {
     let _workers = ["a", "b"].map(|id| authority.worker(&address, id));
     let out = dir.path().join("out");
     let mut submit = horma();
-    submit.args(["submit", text(&sample()), "--master", &address, "-q", "-o"]);
-    submit.arg(&out);
+    submit.args(submission(&sample(), &address, &out));
     for (name, file) in [
         ("CA", "ca.pem"),
         ("CERT", "client.pem"),
@@ -147,14 +147,10 @@ fn servers_go_by_new_certificates_without_a_restart() {
     }
     let submit = |authority: &Authority, name: &str| {
         let out = dir.path().join(name);
-        let args = ["submit", text(&sample()), "--master", &address, "-q", "-o"].map(str::to_owned);
-        let all = [
-            &args[..],
-            &[text(&out).to_owned()],
-            &authority.args("client"),
-        ]
-        .concat();
-        succeed(&words(&all));
+        let (sample, tls) = (sample(), authority.args("client"));
+        let mut args = submission(&sample, &address, &out);
+        args.extend(words(&tls));
+        succeed(&args);
         assert!(std::fs::read(out.join("path.csv")).expect("a path") == alone);
     };
     submit(&before, "still");
@@ -188,8 +184,7 @@ fn check_worker(master: &str, tls: &[String], code: i32, expected: &[&str]) {
 
 fn check_submit(master: &str, tls: &[String], code: i32, expected: &[&str]) {
     let (dir, sample) = (scratch(), sample());
-    let mut args = vec!["submit", text(&sample), "--master", master, "-q", "-o"];
-    args.push(text(dir.path()));
+    let mut args = submission(&sample, master, dir.path());
     args.extend(words(tls));
     check(&args, code, expected);
     let left = std::fs::read_dir(dir.path()).expect("there").count();
@@ -349,8 +344,7 @@ async fn an_address_that_is_no_workers_costs_time_and_no_byte() {
     let _honest = authority.worker(&master, "honest");
     let out = dir.path().join("out");
     let (sample, tls) = (sample(), authority.args("client"));
-    let mut args = vec!["submit", text(&sample), "--master", &master, "-q", "-o"];
-    args.push(text(&out));
+    let mut args = submission(&sample, &master, &out);
     args.extend(words(&tls));
     succeed(&args);
     assert!(std::fs::read(out.join("path.csv")).expect("a path") == alone);

@@ -4,7 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use crate::common::{
-    Process, master, path_of, report, run, sample, scratch, succeed, text, texts, worker,
+    Process, master, path_of, report, run, sample, scratch, submission, succeed, text, texts,
+    worker,
 };
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::submit_request::Kind;
@@ -286,8 +287,7 @@ fn who_waits_outlives_the_master_as_well() {
     let (first, address) = master(&["--store", text(&store)]);
     let mut worker = worker(&address, "w");
     let out = dir.path().join("out");
-    let args = ["submit", text(&job), "--master", &address, "-o", text(&out)];
-    let client = Process::start("submit", &args, "error");
+    let client = Process::start("submit", &submission(&job, &address, &out), "error");
     worker.wait_for(&["positions", "first="]);
     drop(first);
     let _second = again(&address, &store, &[]);
@@ -373,8 +373,7 @@ fn an_interrupted_client_takes_its_job_with_it() {
     let (_master, address) = master(&[]);
     let mut worker = worker(&address, "w");
     let (job, out) = (long_job(dir.path()), dir.path().join("out"));
-    let args = ["submit", text(&job), "--master", &address, "-o", text(&out)];
-    let client = Process::start("submit", &args, "error");
+    let client = Process::start("submit", &submission(&job, &address, &out), "error");
     worker.wait_for(&["positions", "first="]);
     client.signal("-INT");
     let (code, log) = client.end();
@@ -498,7 +497,7 @@ async fn what_is_beyond_a_limit_is_refused_with_what_to_do() {
     check(submit_raw(&address, 1).await, "--max-part");
     let dir = scratch();
     let (job, out) = (short_job(dir.path()), dir.path().join("out"));
-    let refused = run(&["submit", text(&job), "--master", &address, "-o", text(&out)]);
+    let refused = run(&submission(&job, &address, &out));
     let (_, err) = texts(&refused);
     assert_eq!(refused.status.code(), Some(3), "{err}");
     assert!(err.contains("--max-part"), "{err}");
@@ -512,15 +511,7 @@ fn a_result_for_which_there_is_no_room_is_dropped_unless_somebody_waits_for_it()
     let (mut master, address) = master(&["--keep-mb", "0"]);
     let _worker = worker(&address, "w");
     let out = dir.path().join("out");
-    succeed(&[
-        "submit",
-        text(&job),
-        "-q",
-        "--master",
-        &address,
-        "-o",
-        text(&out),
-    ]);
+    succeed(&submission(&job, &address, &out));
     assert!(std::fs::read(out.join("path.csv")).expect("a path") == alone);
     let id = detach(&job, &address, &[]);
     master.wait_for(&[&format!("job={id}"), "Dropped"]);
