@@ -15,6 +15,7 @@ mod scaling;
 
 use std::io::Write;
 use std::path::Path;
+use std::sync::Arc;
 
 use horma_core::{Motion, Part, place};
 use horma_formats::job::{self, JobFile, Overrides};
@@ -86,7 +87,7 @@ fn read(
     job: Option<&Path>,
     overrides: &Overrides,
     display: &Display,
-) -> Result<(JobFile, String, Part)> {
+) -> Result<(JobFile, String, Arc<Part>)> {
     let (file, name, part) = match job {
         Some(path) => {
             let pipeline::Prepared {
@@ -105,7 +106,7 @@ fn read(
             let path = Path::new(sample::JOB);
             let file = job::parse(sample::job_toml(), path, overrides)?;
             let part = sample::last(&sample::LastStyle::WOMEN)?;
-            let part = place(part, file.axis)?;
+            let part = Arc::new(place(part, file.axis)?);
             (file, "the sample last".to_owned(), part)
         }
     };

@@ -3,6 +3,7 @@
 
 use std::net::SocketAddr;
 use std::process::Stdio;
+use std::sync::Arc;
 use std::time::Duration;
 
 use horma_core::{Job, Part, Sharing, Simd};
@@ -40,7 +41,7 @@ pub(crate) struct Workers<'a> {
 
 /// Digitizes a part on worker processes, for one job after the other. Dropping the future stops them.
 pub(crate) async fn run(
-    part: Part,
+    part: Arc<Part>,
     jobs: Vec<Job>,
     sharing: Sharing,
     workers: Workers<'_>,
@@ -68,7 +69,7 @@ impl Local {
     /// Digitizes a part for one job after the other.
     pub async fn run_all(
         &self,
-        part: Part,
+        part: Arc<Part>,
         jobs: Vec<Job>,
         sharing: Sharing,
         progress: &Progress,

@@ -1,5 +1,6 @@
 //! A run in this process.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use horma_core::{
@@ -17,7 +18,7 @@ use crate::{machined, system};
 
 /// Digitizes a part for one job after the other, beside the runtime, until `stop`.
 pub(crate) async fn run_all(
-    part: Part,
+    part: Arc<Part>,
     jobs: Vec<Job>,
     threads: usize,
     simd: Simd,

@@ -1,6 +1,7 @@
 //! A last in a job: in its size and for its side, measured as designed and as machined.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use horma_core::{Frame, Interval, Last, Machined, Part, Shaped, place, shape};
 use horma_formats::csv;
@@ -15,11 +16,11 @@ use crate::{pipeline, say, system};
 
 /// Puts the last that a job speaks of into the size and onto the side that are asked for; travels that the
 /// job gives go with it.
-pub(crate) fn shaped(part: &Part, file: &mut JobFile) -> Result<(Part, Option<Shaped>)> {
+pub(crate) fn shaped(part: Part, file: &mut JobFile) -> Result<(Arc<Part>, Option<Shaped>)> {
     let Some(of) = &file.last else {
-        return Ok((part.clone(), None));
+        return Ok((Arc::new(part), None));
     };
-    let shaped = shape(part, &of.last, of.graded(), of.mirrored())?;
+    let shaped = shape(&part, &of.last, of.graded(), of.mirrored())?;
     let roughing = file.roughing.as_mut().map(|r| &mut r.motion);
     for motion in [&mut file.job.motion].into_iter().chain(roughing) {
         for travel in [&mut motion.from, &mut motion.to] {
@@ -33,7 +34,7 @@ pub(crate) fn shaped(part: &Part, file: &mut JobFile) -> Result<(Part, Option<Sh
             high: shaped.travel(x.high),
         };
     }
-    Ok((shaped.part.clone(), Some(shaped)))
+    Ok((Arc::new(shaped.part.clone()), Some(shaped)))
 }
 
 /// The figures of a job's last, as machined if it is known what is left of it.

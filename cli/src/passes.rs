@@ -1,6 +1,8 @@
 //! The passes of a job: what was digitized for each kept out of what holds the part, the roughing in layers,
 //! and what each of them cuts.
 
+use std::sync::Arc;
+
 use horma_core::{
     Clearances, Job, Layer, Part, Point, Raised, Solid, ToolPath, Verification, deepest_cut,
     keep_out, layers,
@@ -152,12 +154,12 @@ pub(crate) struct Verified {
 /// Verifies the finishing pass and the last layer of the roughing beside the runtime, and refuses one that
 /// gouges deeper than the job's tolerance.
 pub(crate) async fn verified(
-    part: &Part,
+    part: Arc<Part>,
     file: &JobFile,
     passes: &Passes,
     threads: usize,
 ) -> Result<Verified> {
-    let (part, file) = (part.clone(), file.clone());
+    let file = file.clone();
     let finish = passes.finish.positions();
     // What none of the layers before goes below.
     let rough = passes.layers.last().map(|layer| layer.path.positions());

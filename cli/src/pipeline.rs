@@ -53,7 +53,7 @@ impl From<Vec<Outcome>> for Computed {
 
 /// A job with its part in place.
 pub(crate) struct Prepared {
-    pub part: Part,
+    pub part: Arc<Part>,
     pub file: JobFile,
     /// The job as it is said, for the report: what is made of its last is not made of that again.
     pub job: serde_json::Value,
@@ -75,7 +75,7 @@ pub(crate) fn read(file: &Path, overrides: &Overrides) -> Result<Prepared> {
     } = part::read_all(&file.files, &file.reading)?;
     let part = place(part, file.axis)?;
     let job = file.echo();
-    let (part, shaped) = lasts::shaped(&part, &mut file)?;
+    let (part, shaped) = lasts::shaped(part, &mut file)?;
     Ok(Prepared {
         part,
         file,
@@ -93,7 +93,13 @@ pub(crate) fn perform(
     workers: Option<u32>,
     threads: Option<usize>,
     stop: &CancellationToken,
-    compute: impl AsyncFnOnce(Part, &JobFile, Vec<Job>, Display, CancellationToken) -> Result<Computed>,
+    compute: impl AsyncFnOnce(
+        Arc<Part>,
+        &JobFile,
+        Vec<Job>,
+        Display,
+        CancellationToken,
+    ) -> Result<Computed>,
 ) -> Result<()> {
     let runtime = runtime()?;
     stop_when_interrupted(&runtime, stop);
@@ -132,7 +138,13 @@ pub(crate) async fn carry_out(
     threads: Option<usize>,
     display: &Display,
     stop: &CancellationToken,
-    compute: impl AsyncFnOnce(Part, &JobFile, Vec<Job>, Display, CancellationToken) -> Result<Computed>,
+    compute: impl AsyncFnOnce(
+        Arc<Part>,
+        &JobFile,
+        Vec<Job>,
+        Display,
+        CancellationToken,
+    ) -> Result<Computed>,
 ) -> Result<Report> {
     display.tell("read", 0, 0);
     let begin = Instant::now();
@@ -180,7 +192,7 @@ pub(crate) async fn carry_out(
     } else {
         display.tell("verify", 0, 0);
         let begin = Instant::now();
-        let verifying = passes::verified(&part, &file, &passes, threads);
+        let verifying = passes::verified(part.clone(), &file, &passes, threads);
         let verifying = trace::within(info_span!("verify"), verifying);
         let found = unless(stop.clone(), verifying).await?;
         record.phases.push(phase("verify", begin));

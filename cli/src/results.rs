@@ -2,6 +2,7 @@
 
 use std::panic::resume_unwind;
 use std::path::Path;
+use std::sync::Arc;
 use std::thread;
 use std::time::Instant;
 
@@ -22,7 +23,7 @@ use crate::{program, say, verify};
 
 /// What results are written of.
 pub(crate) struct Made {
-    pub part: Part,
+    pub part: Arc<Part>,
     pub file: JobFile,
     pub passes: Passes,
     pub clearances: Option<Clearances>,

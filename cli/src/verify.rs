@@ -1,6 +1,7 @@
 //! Verification: a path held against the designed surface, on its own or at the end of a run.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use horma_core::{
     Clearances, Deviation, Discretization, Gouge, Job, Part, Position, Verification,
@@ -33,7 +34,7 @@ pub(crate) fn read(
     path: &Path,
     job: &Path,
     made: &args::Made,
-) -> Result<(Part, JobFile, Vec<Position>)> {
+) -> Result<(Arc<Part>, JobFile, Vec<Position>)> {
     let positions = csv::read(path)?.iter().map(csv::Row::position).collect();
     let pipeline::Prepared { part, file, .. } = pipeline::read(job, &made.overrides())?;
     Ok((part, file, positions))

@@ -366,7 +366,9 @@ impl Desk {
         let sent = blocking(read).await?;
         let (progress, memory) = (self.progress(job), self.share(job));
         progress("discretize", 0, 0);
-        let planning = self.master.plan(sent.part, sent.job, sent.sharing, memory);
+        let planning = self
+            .master
+            .plan(Arc::new(sent.part), sent.job, sent.sharing, memory);
         let planned = planning.await?;
         let workers = self.master.gather(1).await?;
         // Once it is split it stays so, whoever is there.

@@ -89,7 +89,7 @@ impl Master {
     /// time, and whatever made it fail on the cluster.
     pub async fn run(
         &self,
-        part: Part,
+        part: Arc<Part>,
         job: Job,
         sharing: Sharing,
         at_least: usize,
@@ -109,7 +109,7 @@ impl Master {
     /// Plans a job that may take so much memory, on a thread of its own: discretizing a part is work.
     pub(crate) async fn plan(
         &self,
-        part: Part,
+        part: Arc<Part>,
         job: Job,
         sharing: Sharing,
         memory: u64,

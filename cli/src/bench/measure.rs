@@ -3,6 +3,7 @@
 //! Nothing is measured before it has been checked: exact search, brute force, instruction sets and
 //! threads have to find the same positions to the last bit.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use horma_core::{
@@ -23,7 +24,7 @@ use crate::system;
 #[derive(Debug)]
 pub(super) struct Subject {
     pub name: String,
-    pub part: Part,
+    pub part: Arc<Part>,
     pub cutter: Cutter,
     pub motion: Motion,
 }

@@ -1,5 +1,6 @@
 //! The runs: real processes, each case in its turn, every path held against one process's.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use horma_core::{Distribution, Job, Part, Record, Sharing, Simd, ToolPath};
@@ -70,7 +71,7 @@ impl Run {
 
 /// Runs all cases in turn, as many rounds as asked for.
 pub(super) async fn all(
-    part: &Part,
+    part: &Arc<Part>,
     cases: &[Case],
     rounds: u32,
     display: &Display,
@@ -111,7 +112,7 @@ fn same(path: &ToolPath, one: &ToolPath, what: &str) -> Result<()> {
     })
 }
 
-async fn alone(part: Part, case: &Case, round: u32) -> Result<(Run, ToolPath)> {
+async fn alone(part: Arc<Part>, case: &Case, round: u32) -> Result<(Run, ToolPath)> {
     let (begin, job) = (Instant::now(), case.job);
     let before = own_cpu();
     let run = move || {
@@ -134,7 +135,7 @@ async fn alone(part: Part, case: &Case, round: u32) -> Result<(Run, ToolPath)> {
 }
 
 async fn spread(
-    part: Part,
+    part: Arc<Part>,
     case: &Case,
     way: Distribution,
     workers: u32,
@@ -155,7 +156,7 @@ async fn spread(
         distribution: way,
         extents_per_worker: DEFAULT_EXTENTS_PER_WORKER,
     };
-    let silent = std::sync::Arc::new(|_, _, _| {});
+    let silent = Arc::new(|_, _, _| {});
     let running = local.master.run(part, case.job, sharing, 1, silent);
     let (path, record) = running.await?;
     let run = Run {
