@@ -49,33 +49,28 @@ pub(crate) enum Token {
 
 /// An instruction set that searches are compiled for.
 pub(crate) trait Set: fearless_simd::Simd {
-    /// Does a piece of a search: within its caller, so that vectors stay in registers. Without vectors there
-    /// are so many instructions to it that it is compiled by itself, or compiling would take minutes.
-    fn piece<R>(self, run: impl FnOnce() -> R) -> R;
+    /// Does a piece of a search: within its caller, so that vectors stay in registers.
+    #[inline(always)]
+    fn piece<R>(self, run: impl FnOnce() -> R) -> R {
+        run()
+    }
 }
 
 impl Set for Fallback {
+    /// Without vectors there are so many instructions to it that it is compiled by itself, or compiling would
+    /// take minutes.
     #[inline(never)]
     fn piece<R>(self, run: impl FnOnce() -> R) -> R {
         run()
     }
 }
 
-macro_rules! within_callers {
-    ($($arch:literal: $($set:ty),+;)+) => {$($(
-        #[cfg(target_arch = $arch)]
-        impl Set for $set {
-            #[inline(always)]
-            fn piece<R>(self, run: impl FnOnce() -> R) -> R {
-                run()
-            }
-        }
-    )+)+};
-}
-within_callers! {
-    "x86_64": Avx2, Avx512;
-    "aarch64": Neon;
-}
+#[cfg(target_arch = "x86_64")]
+impl Set for Avx2 {}
+#[cfg(target_arch = "x86_64")]
+impl Set for Avx512 {}
+#[cfg(target_arch = "aarch64")]
+impl Set for Neon {}
 
 /// Evaluates `$run`, compiled for each instruction set and run by that of `$token`, with `$simd` as its
 /// proof. What `$run` calls has to be `#[inline(always)]`, and closures in it too. So little should be in it:
