@@ -1,6 +1,5 @@
 //! A run in this process.
 
-use std::sync::Arc;
 use std::time::Instant;
 
 use horma_core::{
@@ -12,19 +11,18 @@ use tokio_util::sync::CancellationToken;
 use tracing::Span;
 
 use crate::error::{Error, Result};
-use crate::pipeline::{Computed, unless};
+use crate::pipeline::{Computed, Task, unless};
 use crate::progress::Display;
 use crate::{machined, system};
 
 /// Digitizes a part for one job after the other, beside the runtime, until `stop`.
-pub(crate) async fn run_all(
-    part: Arc<Part>,
-    jobs: Vec<Job>,
-    threads: usize,
-    simd: Simd,
-    display: Display,
-    stop: CancellationToken,
-) -> Result<Computed> {
+pub(crate) async fn run_all(task: Task, threads: usize, simd: Simd) -> Result<Computed> {
+    let Task {
+        part,
+        jobs,
+        display,
+        stop,
+    } = task;
     let (stopped, span) = (stop.clone(), Span::current());
     let all = move || {
         let mut computed = Computed::default();

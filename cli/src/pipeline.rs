@@ -33,6 +33,15 @@ pub(crate) struct Asked<'a> {
     pub output: &'a Path,
 }
 
+/// What there is to compute, who hears of it, and what stops it.
+pub(crate) struct Task {
+    pub part: Arc<Part>,
+    /// For each pass.
+    pub jobs: Vec<Job>,
+    pub display: Display,
+    pub stop: CancellationToken,
+}
+
 /// What computing a job gave.
 #[derive(Default)]
 pub(crate) struct Computed {
@@ -93,13 +102,7 @@ pub(crate) fn perform(
     workers: Option<u32>,
     threads: Option<usize>,
     stop: &CancellationToken,
-    compute: impl AsyncFnOnce(
-        Arc<Part>,
-        &JobFile,
-        Vec<Job>,
-        Display,
-        CancellationToken,
-    ) -> Result<Computed>,
+    compute: impl AsyncFnOnce(Task, &JobFile) -> Result<Computed>,
 ) -> Result<()> {
     let runtime = runtime()?;
     stop_when_interrupted(&runtime, stop);
@@ -138,13 +141,7 @@ pub(crate) async fn carry_out(
     threads: Option<usize>,
     display: &Display,
     stop: &CancellationToken,
-    compute: impl AsyncFnOnce(
-        Arc<Part>,
-        &JobFile,
-        Vec<Job>,
-        Display,
-        CancellationToken,
-    ) -> Result<Computed>,
+    compute: impl AsyncFnOnce(Task, &JobFile) -> Result<Computed>,
 ) -> Result<Report> {
     display.tell("read", 0, 0);
     let begin = Instant::now();
@@ -158,13 +155,19 @@ pub(crate) async fn carry_out(
         mut warnings,
         shaped,
     } = prepared;
-    let targets = file.targets()?;
+    let jobs = file.targets()?;
     let read = phase("read", begin);
     output::prepare_dir(asked.output)?;
     for warning in &warnings {
         display.warn(warning);
     }
-    let computing = compute(part.clone(), &file, targets, display.clone(), stop.clone());
+    let task = Task {
+        part: part.clone(),
+        jobs,
+        display: display.clone(),
+        stop: stop.clone(),
+    };
+    let computing = compute(task, &file);
     let needed = !asked.how.no_verify || file.also.iter().any(|a| a.needs_surface());
     let computed = computing.await?;
     let designed = computed.designed.filter(|_| needed);

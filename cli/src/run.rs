@@ -16,7 +16,7 @@ use crate::args;
 use crate::client::Remote;
 use crate::cluster::Workers;
 use crate::error::{Error, Result};
-use crate::pipeline::{Asked, Prepared, perform, progress, read, unless};
+use crate::pipeline::{Asked, Prepared, Task, perform, progress, read, unless};
 use crate::progress::{Audience, Display, Event};
 use crate::serve::runtime;
 use crate::{cluster, forecast, here, say, sizes, submit, system, watch};
@@ -46,15 +46,21 @@ fn one(args: &args::Run, output: &Path, stop: &CancellationToken) -> Result<()> 
         args.workers,
         args.threads.map(usize::from),
         stop,
-        async |part, file, targets, display, stop| {
+        async |task, file| {
             let threads = args.threads.map(usize::from);
             let simd = args.simd.unwrap_or_else(Simd::best);
             let (workers, sharing) = (file.cluster.workers, file.cluster.sharing);
             if workers == 0 {
                 let threads = threads.unwrap_or_else(system::cores);
-                let run = here::run_all(part, targets, threads, simd, display, stop);
+                let run = here::run_all(task, threads, simd);
                 return run.instrument(info_span!("digitize")).await;
             }
+            let Task {
+                part,
+                jobs,
+                display,
+                stop,
+            } = task;
             let progress = progress(display);
             let workers = Workers {
                 number: workers,
@@ -62,7 +68,7 @@ fn one(args: &args::Run, output: &Path, stop: &CancellationToken) -> Result<()> 
                 simd,
                 otlp: args.traces.otlp.as_ref().map(|to| &*to.url),
             };
-            let run = cluster::run(part, targets, sharing, workers, progress);
+            let run = cluster::run(part, jobs, sharing, workers, progress);
             // Dropping it stops the workers.
             Ok(unless(stop, run).await?.into())
         },
@@ -81,11 +87,17 @@ pub(crate) fn submit(args: &args::Submit) -> Result<()> {
         None,
         None,
         &CancellationToken::new(),
-        async |part, file, targets, display, stop| {
+        async |task, file| {
+            let Task {
+                part,
+                jobs,
+                display,
+                stop,
+            } = task;
             display.tell("send", 0, 0);
             let name = name_of(&args.job.file);
             check_divisible(file)?;
-            for job in targets {
+            for job in jobs {
                 let sending = submit::send(&remote, &part, job, file.cluster.sharing, &name);
                 let sending = trace::within(info_span!("send", otel.kind = "client"), sending);
                 sent.push(unless(stop.clone(), sending).await?);
@@ -143,9 +155,9 @@ pub(crate) fn fetch(args: args::Fetch) -> Result<()> {
                 output: &output,
             };
             let stop = CancellationToken::new();
-            perform(&asked, None, None, &stop, async |_, _, _, display, stop| {
-                let progress = progress(display);
-                let fetched = unless(stop, submit::fetch(&remote, id, wait, &progress)).await;
+            perform(&asked, None, None, &stop, async |task, _| {
+                let progress = progress(task.display);
+                let fetched = unless(task.stop, submit::fetch(&remote, id, wait, &progress)).await;
                 Ok(vec![fetched?].into())
             })?;
         }

@@ -8,7 +8,7 @@ use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::thread;
 
-use horma_core::{Job, Simd};
+use horma_core::Simd;
 use horma_formats::job::{self, JobFile, Overrides, Side};
 use horma_formats::output::{self, Staging};
 use horma_formats::sizes::{self, Size, Sizes};
@@ -18,7 +18,7 @@ use tokio_util::sync::CancellationToken;
 use crate::args;
 use crate::cluster::{self, Local, Workers};
 use crate::error::{Error, Result};
-use crate::pipeline::{Asked, carry_out, progress, stop_when_interrupted, unless};
+use crate::pipeline::{Asked, Task, carry_out, progress, stop_when_interrupted, unless};
 use crate::progress::{Audience, Display, Event};
 use crate::serve::{NOTICE, runtime};
 use crate::{here, say, system};
@@ -175,17 +175,14 @@ async fn one(
     // Several at once have no place for the progress of each.
     let display = Display::new(Audience::Nobody);
     let simd = args.simd.unwrap_or_else(Simd::best);
-    let computing =
-        async |part, file: &JobFile, targets: Vec<Job>, display, stop: CancellationToken| {
-            match cluster {
-                Some(local) => {
-                    let (sharing, progress) = (file.cluster.sharing, progress(display));
-                    let run = local.run_all(part, targets, sharing, &progress);
-                    Ok(unless(stop, run).await?.into())
-                }
-                None => here::run_all(part, targets, threads, simd, display, stop).await,
-            }
-        };
+    let computing = async |task: Task, file: &JobFile| match cluster {
+        Some(local) => {
+            let (sharing, progress) = (file.cluster.sharing, progress(task.display));
+            let run = local.run_all(task.part, task.jobs, sharing, &progress);
+            Ok(unless(task.stop, run).await?.into())
+        }
+        None => here::run_all(task, threads, simd).await,
+    };
     let carrying = carry_out(
         &asked,
         &wanted.overrides,
