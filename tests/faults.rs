@@ -7,7 +7,7 @@ mod slow;
 use std::path::{Path, PathBuf};
 
 use crate::common::{
-    Process, brute_job, data, master, path_of, report, sample, scratch, submission, text,
+    Process, brute_job, data, master, path_of, report, sample, scratch, submit, text,
 };
 use crate::common::{wait_until, worker};
 use horma_proto::wire::digitize_reply::Kind;
@@ -25,10 +25,6 @@ fn long_job(dir: &Path) -> PathBuf {
 
 fn long_job_of(dir: &Path, part: &Path, contact: &str) -> PathBuf {
     brute_job(dir, "long.toml", part, contact, [159, 120])
-}
-
-fn submit(job: &Path, master: &str, out: &Path) -> Process {
-    Process::start("submit", &submission(job, master, out), "error")
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::common::browser::Browser;
-use crate::common::{Process, get, http, master, sample, scratch, submission, worker};
+use crate::common::{Process, get, http, master, sample, scratch, submit, worker};
 use serde_json::{Value, json};
 
 const ARROW_RIGHT: char = '\u{E014}';
@@ -40,7 +40,7 @@ fn the_page_shows_a_job_from_its_begin_to_its_end() {
     // One of the two stands still for as long as it takes to see that the other has gone on.
     workers[1].signal("-STOP");
     let (sample, out) = (sample(), dir.path().join("out"));
-    let submit = Process::start("submit", &submission(&sample, &address, &out), "error");
+    let submit = submit(&sample, &address, &out);
     browser.wait("document.querySelectorAll('.strip li').length === 2");
     browser.wait("document.querySelectorAll('.strip [data-state=running]').length === 1");
     browser.wait("document.querySelectorAll('.strip [data-state=done]').length === 1");

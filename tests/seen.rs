@@ -119,7 +119,8 @@ fn metrics_are_what_the_documentation_lists_and_the_report_tells() {
     let number = |value: &Value| value.as_f64().expect("a number");
     let positions = number(&report["path"]["positions"]);
     // On a busy machine one worker helps the other, and some of it is done twice.
-    let helped = report["second"].as_array().is_some_and(|s| !s.is_empty());
+    let helps = report["second"].as_array().map_or(0, Vec::len) as f64;
+    let helped = helps > 0.0;
     let same = |found: f64, told: f64| found == told || (helped && found > told);
     let (received, digitized) = (
         master["horma_positions_total"],
@@ -155,7 +156,8 @@ fn metrics_are_what_the_documentation_lists_and_the_report_tells() {
     assert_eq!(all("horma_registered"), 2.0);
     let tasks = all("horma_task_phase_seconds_count{phase=\"digitize\"}");
     // One whose worker was helped to the end is abandoned, not finished.
-    assert!(tasks == 2.0 || (helped && tasks >= 1.0), "{tasks}");
+    let least = if helped { 1.0 } else { 2.0 };
+    assert!((least..=2.0 + helps).contains(&tasks), "{tasks}");
     assert!(master["process_resident_memory_bytes"] > 1e6);
 }
 

@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use crate::common::{
-    Process, master, path_of, report, run, sample, scratch, submission, succeed, text, texts,
-    worker,
+    Process, master, path_of, report, run, sample, scratch, submission, submit, succeed, text,
+    texts, worker,
 };
 use horma_proto::wire::master_client::MasterClient;
 use horma_proto::wire::submit_request::Kind;
@@ -287,7 +287,7 @@ fn who_waits_outlives_the_master_as_well() {
     let (first, address) = master(&["--store", text(&store)]);
     let mut worker = worker(&address, "w");
     let out = dir.path().join("out");
-    let client = Process::start("submit", &submission(&job, &address, &out), "error");
+    let client = submit(&job, &address, &out);
     worker.wait_for(&["positions", "first="]);
     drop(first);
     let _second = again(&address, &store, &[]);
@@ -373,7 +373,7 @@ fn an_interrupted_client_takes_its_job_with_it() {
     let (_master, address) = master(&[]);
     let mut worker = worker(&address, "w");
     let (job, out) = (long_job(dir.path()), dir.path().join("out"));
-    let client = Process::start("submit", &submission(&job, &address, &out), "error");
+    let client = submit(&job, &address, &out);
     worker.wait_for(&["positions", "first="]);
     client.signal("-INT");
     let (code, log) = client.end();

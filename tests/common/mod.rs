@@ -76,6 +76,11 @@ pub fn submission<'a>(job: &'a Path, master: &'a str, out: &'a Path) -> Vec<&'a 
     words.to_vec()
 }
 
+/// That, going on.
+pub fn submit(job: &Path, master: &str, out: &Path) -> Process {
+    Process::start("submit", &submission(job, master, out), "error")
+}
+
 /// A scratch directory.
 pub fn scratch() -> tempfile::TempDir {
     tempfile::tempdir().expect("a scratch directory")
