@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use crate::leaf::{FACETS, FacetLeaf, POINTS, PointLeaf};
 use crate::row::{Row, RowKind, cell};
-use crate::vector::{Interval, Point};
+use crate::vector::{Point, add_scaled, sub};
 
 /// Rows and columns of a block of points.
 const SIDE: usize = 4;
@@ -28,11 +28,11 @@ pub(crate) struct Block {
 enum What {
     /// The points, or the cells, of these rows and columns.
     Tile {
-        rows: Range<usize>,
-        columns: Range<usize>,
+        rows: Range<u32>,
+        columns: Range<u32>,
     },
     /// Those of one row with these numbers.
-    Scattered { row: usize, numbers: Vec<usize> },
+    Scattered { row: u32, numbers: Box<[u32]> },
 }
 
 /// Runs of rows: joined isolines, or a slab or an isoline by itself.
@@ -49,80 +49,81 @@ pub(crate) fn runs(rows: &[Row]) -> impl Iterator<Item = (usize, &[Row])> {
 
 /// Blocks of all points.
 pub(crate) fn point_blocks(rows: &[Row]) -> Vec<Block> {
-    let blocks = |(first, run): (usize, &[Row])| match &run[0].kind {
-        RowKind::Slab { .. } => {
-            let points = &run[0].points;
-            scatter(first, points, POINTS)
+    let mut blocks = Vec::new();
+    for (first, run) in runs(rows) {
+        match &run[0].kind {
+            RowKind::Slab { .. } => scatter(first, &run[0].points, POINTS, &mut blocks),
+            RowKind::Isoline { .. } => {
+                let side = run.len().min(SIDE);
+                let size = [run.len(), run[0].points.len()];
+                tile(first, run, size, [side, POINTS / side], &mut blocks);
+            }
         }
-        RowKind::Isoline { .. } => {
-            let side = run.len().min(SIDE);
-            let size = (run.len(), run[0].points.len());
-            tile(first, run, size, (side, POINTS / side))
-        }
-    };
-    runs(rows).flat_map(blocks).collect()
+    }
+    blocks
 }
 
 /// Blocks of all facets.
 pub(crate) fn facet_blocks(rows: &[Row]) -> Vec<Block> {
-    let blocks = |(first, run): (usize, &[Row])| match &run[0].kind {
-        RowKind::Slab { facets } => {
-            let points = &run[0].points;
-            let middle = |f: &[u32; 3]| {
-                let [a, b, c] = f.map(|c| points[c as usize]);
-                [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
-            };
-            let middles: Vec<Point> = facets.iter().map(middle).collect();
-            scatter(first, &middles, FACETS)
+    let mut blocks = Vec::new();
+    for (first, run) in runs(rows) {
+        match &run[0].kind {
+            RowKind::Slab { facets } => {
+                let points = &run[0].points;
+                let middle = |f: &[u32; 3]| {
+                    let [a, b, c] = f.map(|c| points[c as usize]);
+                    [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
+                };
+                let middles: Vec<Point> = facets.iter().map(middle).collect();
+                scatter(first, &middles, FACETS, &mut blocks);
+            }
+            RowKind::Isoline { .. } => {
+                let cells = [run.len() - 1, run[0].points.len().saturating_sub(1)];
+                tile(first, run, cells, [CELLS, CELLS], &mut blocks);
+            }
         }
-        RowKind::Isoline { .. } => {
-            let cells = (run.len() - 1, run[0].points.len().saturating_sub(1));
-            tile(first, run, cells, (CELLS, CELLS))
-        }
-    };
-    runs(rows).flat_map(blocks).collect()
+    }
+    blocks
 }
 
 /// Cuts `size` rows and columns of a run into blocks of `side`.
-fn tile(first: usize, run: &[Row], size: (usize, usize), side: (usize, usize)) -> Vec<Block> {
-    let block = |row: usize, column: usize| {
-        let rows = row..size.0.min(row + side.0);
-        let columns = column..size.1.min(column + side.1);
-        Block {
-            middle: run[rows.start + rows.len() / 2].points[columns.start + columns.len() / 2],
-            what: What::Tile {
-                rows: first + rows.start..first + rows.end,
-                columns,
-            },
+fn tile(first: usize, run: &[Row], size: [usize; 2], side: [usize; 2], blocks: &mut Vec<Block>) {
+    blocks.reserve(size[0].div_ceil(side[0]) * size[1].div_ceil(side[1]));
+    for row in (0..size[0]).step_by(side[0]) {
+        let rows = row..size[0].min(row + side[0]);
+        let middle = &run[rows.start + rows.len() / 2].points;
+        for column in (0..size[1]).step_by(side[1]) {
+            let columns = column..size[1].min(column + side[1]);
+            blocks.push(Block {
+                middle: middle[columns.start + columns.len() / 2],
+                what: What::Tile {
+                    rows: (first + rows.start) as u32..(first + rows.end) as u32,
+                    columns: columns.start as u32..columns.end as u32,
+                },
+            });
         }
-    };
-    let starts = (0..size.0).step_by(side.0);
-    starts
-        .flat_map(|row| (0..size.1).step_by(side.1).map(move |column| (row, column)))
-        .map(|(row, column)| block(row, column))
-        .collect()
+    }
 }
 
 /// Halves candidates along their longest side until each lot fits into a leaf.
-fn scatter(row: usize, middles: &[Point], leaf: usize) -> Vec<Block> {
-    let mut numbers: Vec<usize> = (0..middles.len()).collect();
-    let mut blocks = Vec::new();
+fn scatter(row: usize, middles: &[Point], leaf: usize, blocks: &mut Vec<Block>) {
+    let mut numbers: Vec<u32> = (0..middles.len() as u32).collect();
     let mut lots = vec![&mut numbers[..]];
+    let at = |n: &u32| middles[*n as usize];
     while let Some(lot) = lots.pop() {
         if lot.len() <= leaf {
-            let sum = lot.iter().fold([0.0; 3], |sum, &n| {
-                [0, 1, 2].map(|k| sum[k] + middles[n][k])
-            });
+            let sum = lot
+                .iter()
+                .fold([0.0; 3], |sum, n| add_scaled(sum, 1.0, at(n)));
             blocks.push(Block {
                 middle: sum.map(|s| s / lot.len() as f64),
                 what: What::Scattered {
-                    row,
-                    numbers: lot.to_vec(),
+                    row: row as u32,
+                    numbers: (&*lot).into(),
                 },
             });
         } else {
-            let at = |n: &usize| middles[*n];
-            let axis = longest_side(&lot.iter().map(at));
+            let axis = longest_side(lot.iter().map(at));
             // Full leaves on the left.
             let half = (lot.len().div_ceil(leaf) / 2) * leaf;
             lot.select_nth_unstable_by(half, |a, b| at(a)[axis].total_cmp(&at(b)[axis]));
@@ -130,32 +131,79 @@ fn scatter(row: usize, middles: &[Point], leaf: usize) -> Vec<Block> {
             lots.extend([left, right]);
         }
     }
-    blocks
 }
 
 /// The axis along which points extend most.
-pub(crate) fn longest_side(points: &(impl Iterator<Item = Point> + Clone)) -> usize {
-    let extent = |axis: usize| {
-        let range = Interval::of(points.clone().map(|p| p[axis]));
-        range.high - range.low
-    };
-    let extents = [extent(0), extent(1), extent(2)];
+pub(crate) fn longest_side(points: impl Iterator<Item = Point>) -> usize {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for p in points {
+        for k in 0..3 {
+            low[k] = if p[k] < low[k] { p[k] } else { low[k] };
+            high[k] = if p[k] > high[k] { p[k] } else { high[k] };
+        }
+    }
+    let extents = sub(high, low);
     (0..3).fold(0, |a, b| if extents[b] > extents[a] { b } else { a })
+}
+
+/// Leaves the vertices of a block of points to `take`.
+pub(crate) fn point_vertices(rows: &[Row], block: &Block, take: &mut dyn FnMut(Point)) {
+    each_point(rows, block, |row, i| take(row.points[i]));
 }
 
 /// The leaf of a block of points.
 pub(crate) fn point_leaf(rows: &[Row], block: &Block) -> PointLeaf {
-    let numbered = |row: &Row, i: usize| (row.candidate(i), row.points[i]);
+    let mut leaf = PointLeaf::EMPTY;
+    each_point(rows, block, |row, i| {
+        leaf.push(row.candidate(i), row.points[i])
+    });
+    leaf
+}
+
+/// Each point of a block by its row and its place there.
+fn each_point(rows: &[Row], block: &Block, mut each: impl FnMut(&Row, usize)) {
     match &block.what {
         What::Tile {
             rows: some,
             columns,
         } => {
-            let rows = rows[some.clone()].iter();
-            PointLeaf::new(rows.flat_map(|row| columns.clone().map(move |i| numbered(row, i))))
+            for row in &rows[some.start as usize..some.end as usize] {
+                columns.clone().for_each(|i| each(row, i as usize));
+            }
         }
         What::Scattered { row, numbers } => {
-            PointLeaf::new(numbers.iter().map(|&i| numbered(&rows[*row], i)))
+            let row = &rows[*row as usize];
+            numbers.iter().for_each(|&i| each(row, i as usize));
+        }
+    }
+}
+
+/// Leaves the vertices of a block of facets to `take`, each once.
+pub(crate) fn facet_vertices(rows: &[Row], block: &Block, take: &mut dyn FnMut(Point)) {
+    match &block.what {
+        What::Tile {
+            rows: some,
+            columns,
+        } => {
+            let columns = columns.start as usize..=columns.end as usize;
+            for row in &rows[some.start as usize..=some.end as usize] {
+                row.points[columns.clone()]
+                    .iter()
+                    .copied()
+                    .for_each(&mut *take);
+            }
+        }
+        What::Scattered { row, numbers } => {
+            let row = &rows[*row as usize];
+            let facets = row.facets();
+            let mut corners = [0; 3 * FACETS];
+            let corners = &mut corners[..3 * numbers.len()];
+            for (corners, &n) in corners.chunks_exact_mut(3).zip(numbers) {
+                corners.copy_from_slice(&facets[n as usize]);
+            }
+            corners.sort_unstable();
+            let distinct = corners.chunk_by(|a, b| a == b);
+            distinct.for_each(|c| take(row.points[c[0] as usize]));
         }
     }
 }
@@ -167,30 +215,33 @@ pub(crate) fn facet_leaf(
     points: &[Point],
     block: &Block,
 ) -> FacetLeaf {
+    let (mut facets, mut count) = ([([0; 3], 0); FACETS], 0);
+    let mut push = |corners, id| {
+        facets[count] = (corners, id);
+        count += 1;
+    };
     match &block.what {
         What::Tile {
             rows: some,
             columns,
         } => {
-            let cells = some
-                .clone()
-                .flat_map(|row| columns.clone().map(move |column| (row, column)));
-            let facets = cells.flat_map(|(row, column)| {
-                let first = rows[row].candidate(2 * column);
-                let column = column as u32;
-                let [a, b] = cell(starts[row] + column, starts[row + 1] + column);
-                [(a, first), (b, first + 1)]
-            });
-            FacetLeaf::new(points, facets)
+            for row in some.start as usize..some.end as usize {
+                for column in columns.clone() {
+                    let first = rows[row].candidate(2 * column as usize);
+                    let [a, b] = cell(starts[row] + column, starts[row + 1] + column);
+                    push(a, first);
+                    push(b, first + 1);
+                }
+            }
         }
         What::Scattered { row, numbers } => {
-            let (row, start) = (&rows[*row], starts[*row]);
-            let facets: &[[u32; 3]] = match &row.kind {
-                RowKind::Slab { facets } => facets,
-                RowKind::Isoline { .. } => &[],
-            };
-            let facet = |&n: &usize| (facets[n].map(|c| start + c), row.candidate(n));
-            FacetLeaf::new(points, numbers.iter().map(facet))
+            let (row, start) = (&rows[*row as usize], starts[*row as usize]);
+            let facets = row.facets();
+            for &n in numbers {
+                let n = n as usize;
+                push(facets[n].map(|c| start + c), row.candidate(n));
+            }
         }
     }
+    FacetLeaf::new(points, &facets[..count])
 }

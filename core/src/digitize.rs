@@ -10,7 +10,9 @@ use rayon::prelude::*;
 
 use crate::between::{self, Probe};
 use crate::bisect::first_without;
-use crate::blocks::{facet_blocks, facet_leaf, point_blocks, point_leaf};
+use crate::blocks::{
+    facet_blocks, facet_leaf, facet_vertices, point_blocks, point_leaf, point_vertices,
+};
 use crate::contact::{Pose, least_height};
 use crate::cutter::Cutter;
 use crate::job::{Contact, Job, Local, Method, Window};
@@ -66,21 +68,22 @@ enum Search {
 impl Digitizer {
     /// Makes rows ready; they are in order of their ids. Runs on the current thread pool.
     pub fn new(job: &Job, rows: &[Row], simd: Simd) -> Self {
+        let simd = simd.token();
         let search = match (job.method, job.contact) {
-            (Method::Exact, Contact::Point) => Search::Points(point_tree(rows)),
-            (Method::Exact, Contact::Facet) => Search::Facets(facet_tree(rows)),
+            (Method::Exact, Contact::Point) => Search::Points(point_tree(simd, rows)),
+            (Method::Exact, Contact::Facet) => Search::Facets(facet_tree(simd, rows)),
             (Method::Brute, Contact::Point) => Search::AllPoints(Sweep::new(rows, &[], false)),
             (Method::Brute, Contact::Facet) => Search::AllFacets(AllFacets::new(rows)),
             (Method::Local(local), _) => Search::Windows {
                 grids: Grids::new(rows, local.culling),
-                tree: point_tree(rows),
+                tree: point_tree(simd, rows),
                 window: local.window.unwrap_or(Window::EVERYTHING),
             },
         };
         Self {
             cutter: job.cutter,
             path_tolerance: job.motion.path_tolerance,
-            simd: simd.token(),
+            simd,
             search,
         }
     }
@@ -88,11 +91,12 @@ impl Digitizer {
     /// Makes facets ready for a cutter, each position for itself and by the exact search. Runs on the current
     /// thread pool.
     pub(crate) fn over_facets(cutter: Cutter, rows: &[Row], simd: Simd) -> Self {
+        let simd = simd.token();
         Self {
             cutter,
             path_tolerance: None,
-            simd: simd.token(),
-            search: Search::Facets(facet_tree(rows)),
+            simd,
+            search: Search::Facets(facet_tree(simd, rows)),
         }
     }
 
@@ -334,18 +338,29 @@ fn poses(
     })
 }
 
-fn point_tree(rows: &[Row]) -> Tree<PointLeaf> {
-    Tree::new(Vec::new(), point_blocks(rows), |_, block| {
-        point_leaf(rows, block)
-    })
+fn point_tree(simd: Token, rows: &[Row]) -> Tree<PointLeaf> {
+    Tree::new(
+        simd,
+        Vec::new(),
+        point_blocks(rows),
+        |_, block| point_leaf(rows, block),
+        |block, take| point_vertices(rows, block, take),
+    )
 }
 
-fn facet_tree(rows: &[Row]) -> Tree<FacetLeaf> {
+fn facet_tree(simd: Token, rows: &[Row]) -> Tree<FacetLeaf> {
     let starts = starts(rows);
-    let points = rows.iter().flat_map(|r| r.points.iter().copied()).collect();
-    Tree::new(points, facet_blocks(rows), |points, block| {
-        facet_leaf(rows, &starts, points, block)
-    })
+    let mut points = Vec::with_capacity(rows.iter().map(|row| row.points.len()).sum());
+    for row in rows {
+        points.extend_from_slice(&row.points);
+    }
+    Tree::new(
+        simd,
+        points,
+        facet_blocks(rows),
+        |points, block| facet_leaf(rows, &starts, points, block),
+        |block, take| facet_vertices(rows, block, take),
+    )
 }
 
 fn exact<L: Leaf>(

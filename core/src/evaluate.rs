@@ -14,14 +14,16 @@ use std::ops::Range;
 use crate::surface::{Basis, Surface};
 use crate::vector::Point;
 
-/// A surface with its poles a coordinate at a time.
-pub(crate) struct Net<'a> {
+/// A surface made ready to be evaluated, with its poles a coordinate at a time.
+pub struct Net<'a> {
+    /// The surface.
     pub surface: &'a Surface,
     /// Coordinates and weights of the poles.
     poles: Coordinates,
 }
 
 impl<'a> Net<'a> {
+    /// Copies the poles, which is worth it once for several grids.
     pub fn new(surface: &'a Surface) -> Self {
         let coordinate = |k: usize| surface.poles().iter().map(|p| p[k]).collect();
         Self {
@@ -36,6 +38,7 @@ impl<'a> Net<'a> {
     }
 
     /// The points at every pair of parameters, `us.len() × vs.len()`, v running fastest, mm.
+    /// Eq. (3) of the 2001 paper.
     pub fn grid(&self, us: &[f64], vs: &[f64]) -> Vec<Point> {
         let isolines = Isolines::new(self, vs);
         let mut line = Isoline::default();

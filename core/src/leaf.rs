@@ -68,9 +68,6 @@ pub(crate) trait Leaf: Sync + Send {
     /// The ceiling that touches F at a place on the cutter, `(d, z)`.
     fn ceiling(cutter: &Cutter, pose: &Pose, place: [f64; 2]) -> Self::Ceiling;
 
-    /// Its vertices.
-    fn vertices(&self, points: &[Point]) -> Vec<Point>;
-
     /// Raises `best` to the highest candidate; none is above the ceiling. Returns how many candidates
     /// were evaluated.
     fn search<S: Set>(
@@ -97,22 +94,20 @@ pub(crate) struct PointLeaf {
 }
 
 impl PointLeaf {
-    /// Of at most [`POINTS`] numbered points.
-    pub fn new(points: impl Iterator<Item = (u64, Point)>) -> Self {
-        let mut leaf = Self {
-            at: [[f64::INFINITY; POINTS], [0.0; POINTS], [0.0; POINTS]],
-            ids: [u64::MAX; POINTS],
-            count: 0,
-        };
-        for (id, point) in points {
-            let slot = leaf.count;
-            for (axis, coordinate) in leaf.at.iter_mut().zip(point) {
-                axis[slot] = coordinate;
-            }
-            leaf.ids[slot] = id;
-            leaf.count += 1;
+    /// Nothing yet.
+    pub const EMPTY: Self = Self {
+        at: [[f64::INFINITY; POINTS], [0.0; POINTS], [0.0; POINTS]],
+        ids: [u64::MAX; POINTS],
+        count: 0,
+    };
+
+    /// Adds a point to less than [`POINTS`] others.
+    pub fn push(&mut self, id: u64, point: Point) {
+        for (axis, coordinate) in self.at.iter_mut().zip(point) {
+            axis[self.count] = coordinate;
         }
-        leaf
+        self.ids[self.count] = id;
+        self.count += 1;
     }
 
     /// Heights of eight of its points.
@@ -138,10 +133,6 @@ impl Leaf for PointLeaf {
 
     #[inline(always)]
     fn ceiling(_: &Cutter, _: &Pose, _: [f64; 2]) -> Self::Ceiling {}
-
-    fn vertices(&self, _: &[Point]) -> Vec<Point> {
-        (0..self.count).map(|slot| self.point(slot)).collect()
-    }
 
     #[inline(always)]
     fn search<S: Set>(
@@ -191,32 +182,35 @@ pub(crate) struct FacetLeaf {
 }
 
 impl FacetLeaf {
-    /// Of one to [`FACETS`] numbered facets.
-    pub fn new(points: &[Point], facets: impl Iterator<Item = ([u32; 3], u64)>) -> Self {
+    /// Of one to [`FACETS`] facets with their numbers.
+    pub fn new(points: &[Point], facets: &[([u32; 3], u64)]) -> Self {
         let mut leaf = Self {
             near: [[[0.0; FACETS]; 3]; 3],
             middle: [0.0; 3],
             size: 0.0,
-            count: 0,
+            count: facets.len() as u32,
             corners: [[0; 3]; FACETS],
             ids: [Best::NOBODY; FACETS],
         };
-        for (corners, id) in facets {
-            leaf.corners[leaf.count as usize] = corners;
-            leaf.ids[leaf.count as usize] = id;
-            leaf.count += 1;
-        }
-        let used = leaf.corners[..leaf.count as usize].as_flattened();
-        let ranges = [0, 1, 2].map(|k| Interval::of(used.iter().map(|&c| points[c as usize][k])));
-        leaf.middle = ranges.map(|r| (r.low + r.high) / 2.0);
-        for k in 0..3 {
-            leaf.size = leaf.size.max((ranges[k].high - leaf.middle[k]) as f32);
-            for slot in 0..FACETS {
-                let used = if slot < leaf.count as usize { slot } else { 0 };
-                for c in 0..3 {
-                    let point = points[leaf.corners[used][c] as usize];
-                    leaf.near[c][k][slot] = (point[k] - leaf.middle[k]) as f32;
+        // By corner and axis.
+        let mut at = [[[0.0; FACETS]; 3]; 3];
+        for slot in 0..FACETS {
+            let (corners, id) = *facets.get(slot).unwrap_or(&facets[0]);
+            (leaf.corners[slot], leaf.ids[slot]) = (corners, id);
+            for (at, corner) in at.iter_mut().zip(corners) {
+                let p = points[corner as usize];
+                for k in 0..3 {
+                    at[k][slot] = p[k];
                 }
+            }
+        }
+        for k in 0..3 {
+            let corners = at.each_ref().map(|axes| &axes[k]);
+            let Interval { low, high } = range(corners);
+            leaf.middle[k] = (low + high) / 2.0;
+            leaf.size = leaf.size.max((high - leaf.middle[k]) as f32);
+            for (near, corner) in leaf.near.iter_mut().zip(corners) {
+                near[k] = corner.map(|c| (c - leaf.middle[k]) as f32);
             }
         }
         leaf
@@ -238,22 +232,25 @@ impl FacetLeaf {
     }
 }
 
+/// The range of one coordinate of facets, given by their corners.
+fn range([a, b, c]: [&[f64; FACETS]; 3]) -> Interval {
+    // Facet by facet first, which is vectors; comparisons are one instruction, and nothing here is NaN.
+    let less = |a: f64, b: f64| if a < b { a } else { b };
+    let greater = |a: f64, b: f64| if a > b { a } else { b };
+    let low: [f64; FACETS] = std::array::from_fn(|i| less(less(a[i], b[i]), c[i]));
+    let high: [f64; FACETS] = std::array::from_fn(|i| greater(greater(a[i], b[i]), c[i]));
+    Interval {
+        low: low.into_iter().fold(low[0], less),
+        high: high.into_iter().fold(high[0], greater),
+    }
+}
+
 impl Leaf for FacetLeaf {
     type Ceiling = Plane;
 
     #[inline(always)]
     fn ceiling(cutter: &Cutter, pose: &Pose, place: [f64; 2]) -> Self::Ceiling {
         Plane::at(cutter, pose, place)
-    }
-
-    fn vertices(&self, points: &[Point]) -> Vec<Point> {
-        let mut corners = [0; 3 * FACETS];
-        let used = 3 * self.count as usize;
-        corners[..used].copy_from_slice(self.corners[..self.count as usize].as_flattened());
-        let corners = &mut corners[..used];
-        corners.sort_unstable();
-        let distinct = corners.chunk_by(|a, b| a == b);
-        distinct.map(|c| points[c[0] as usize]).collect()
     }
 
     #[inline(always)]

@@ -103,6 +103,7 @@ mod bound;
 mod blocks;
 mod leaf;
 mod tree;
+mod vertices;
 
 mod local;
 mod sweep;
@@ -135,6 +136,7 @@ pub use cutter::Cutter;
 pub use digitize::{Digitizer, Heuristic};
 pub use discretize::{Model, discretize};
 pub use error::{Error, Result};
+pub use evaluate::Net;
 pub use extent::{Extent, Halo};
 pub use feed::{AxisLimits, Bound, Limits, Peak, Steady, Timing, peaks, steady, timing};
 pub use grid::SurfaceGrid;

@@ -55,6 +55,14 @@ impl Outline {
 }
 
 impl Row {
+    /// The facets it has by itself, as places among its points.
+    pub(crate) fn facets(&self) -> &[[u32; 3]] {
+        match &self.kind {
+            RowKind::Isoline { .. } => &[],
+            RowKind::Slab { facets } => facets,
+        }
+    }
+
     /// Checks a row that came from outside.
     ///
     /// # Errors
@@ -63,14 +71,8 @@ impl Row {
     pub fn validate(&self) -> Result<()> {
         check_points("a row", "point", &self.points)?;
         let points = self.points.len();
-        let facets: &[[u32; 3]] = match &self.kind {
-            RowKind::Isoline { .. } => &[],
-            RowKind::Slab { facets } => facets,
-        };
-        match facets
-            .iter()
-            .position(|f| f.iter().any(|&p| p as usize >= points))
-        {
+        let beyond = |f: &[u32; 3]| f.iter().any(|&p| p as usize >= points);
+        match self.facets().iter().position(beyond) {
             None => Ok(()),
             Some(facet) => Err(Error::BadRow {
                 row: self.id,

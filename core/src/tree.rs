@@ -17,7 +17,8 @@ use crate::lanes::{LANES, Lanes, lanes};
 use crate::leaf::{Best, Leaf};
 use crate::record::Counters;
 use crate::simd::{Set, Token, with_simd};
-use crate::vector::{Interval, Point};
+use crate::vector::Point;
+use crate::vertices::Vertices;
 
 /// The hierarchy.
 #[derive(Debug)]
@@ -46,26 +47,24 @@ const ALONE: usize = 256;
 impl<L: Leaf> Tree<L> {
     /// Builds the hierarchy, in parallel on the current thread pool.
     pub fn new(
+        simd: Token,
         points: Vec<Point>,
         mut blocks: Vec<Block>,
         fill: impl Fn(&[Point], &Block) -> L + Sync + Send,
+        vertices: impl Fn(&Block, &mut dyn FnMut(Point)) + Sync + Send,
     ) -> Self {
         arrange(&mut blocks);
-        let filled = blocks.par_iter().with_min_len(ALONE).map(|block| {
-            let leaf = fill(&points, block);
-            let vertices = leaf.vertices(&points);
-            (leaf, vertices)
-        });
-        let (leaves, vertices): (Vec<L>, Vec<Vec<Point>>) = filled.unzip();
-        let outline = Outline::new(&vertices);
-        let frame = outline.frame();
+        let leaves = blocks.par_iter().with_min_len(ALONE);
+        let leaves: Vec<L> = leaves.map(|block| fill(&points, block)).collect();
+        let vertices = Vertices::of(&blocks, vertices);
+        let frame = vertices.frame();
         let empty = Node {
             lids: Lids::EMPTY,
             children: [0; LANES],
         };
         let mut nodes = vec![empty; nodes(leaves.len())];
         if !leaves.is_empty() {
-            build(&frame, &outline, 0..leaves.len(), &mut nodes, 0);
+            build(simd, &frame, &vertices, 0..leaves.len(), &mut nodes, 0);
         }
         Self {
             frame,
@@ -342,7 +341,7 @@ fn part(blocks: &mut [Block], size: usize) {
     }
     let children = blocks.len().div_ceil(size);
     let left = children / 2 * size;
-    let axis = longest_side(&blocks.iter().map(|b| b.middle));
+    let axis = longest_side(blocks.iter().map(|b| b.middle));
     let middle = |b: &Block| b.middle[axis];
     blocks.select_nth_unstable_by(left, |a, b| middle(a).total_cmp(&middle(b)));
     let (left, right) = blocks.split_at_mut(left);
@@ -354,40 +353,11 @@ fn part(blocks: &mut [Block], size: usize) {
     }
 }
 
-/// The vertices of all leaves, one leaf after the other.
-struct Outline {
-    points: Vec<Point>,
-    /// Where those of each leaf begin, and where the last end.
-    starts: Vec<usize>,
-}
-
-impl Outline {
-    fn new(leaves: &[Vec<Point>]) -> Self {
-        let mut starts = vec![0];
-        let mut points = Vec::with_capacity(leaves.iter().map(Vec::len).sum());
-        for vertices in leaves {
-            points.extend_from_slice(vertices);
-            starts.push(points.len());
-        }
-        Self { points, starts }
-    }
-
-    fn of(&self, leaves: Range<usize>) -> &[Point] {
-        &self.points[self.starts[leaves.start]..self.starts[leaves.end]]
-    }
-
-    fn frame(&self) -> Frame {
-        let x = Interval::of(self.points.iter().map(|p| p[0]));
-        let square = |p: &Point| p[1] * p[1] + p[2] * p[2];
-        let across = self.points.iter().map(square).fold(0.0, f64::max);
-        Frame::new(x, across.sqrt())
-    }
-}
-
 /// Fills the nodes over leaves that are in order; `offset` is the place of the first node.
 fn build(
+    simd: Token,
     frame: &Frame,
-    outline: &Outline,
+    vertices: &Vertices,
     leaves: Range<usize>,
     nodes: &mut [Node],
     offset: usize,
@@ -413,13 +383,14 @@ fn build(
     }
     let fill = |node: &mut Node| {
         for (lane, start) in starts() {
-            node.lids.set(lane, frame, outline.of(child(start)));
+            let points = vertices.under(child(start));
+            with_simd!(simd, simd => node.lids.set(simd, lane, frame, points));
         }
     };
     if leaves.len() < ALONE {
         fill(node);
         for (child, nodes, offset) in tasks {
-            build(frame, outline, child, nodes, offset);
+            build(simd, frame, vertices, child, nodes, offset);
         }
     } else {
         rayon::join(
@@ -427,7 +398,7 @@ fn build(
             || {
                 let tasks = tasks.into_par_iter();
                 tasks.for_each(|(child, nodes, offset)| {
-                    build(frame, outline, child, nodes, offset);
+                    build(simd, frame, vertices, child, nodes, offset);
                 });
             },
         );

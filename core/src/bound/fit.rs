@@ -3,21 +3,43 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::vector::{Point, add_scaled, cross, sub, unit};
+use crate::vertices::Axes;
 
-/// Points that a lid is fitted to.
-pub(super) const FIT: usize = 64;
+/// Points that a lid is fitted to, at most.
+const FIT: usize = 64;
+
+/// A few of some points, evenly spread, and how many these are.
+pub(super) fn few<'a>(points: impl Iterator<Item = Axes<'a>> + Clone) -> ([Point; FIT], usize) {
+    let all: usize = points.clone().map(|[x, ..]| x.len()).sum();
+    let step = all.div_ceil(FIT);
+    let (mut few, mut count, mut next) = ([[0.0; 3]; FIT], 0, 0);
+    for [x, y, z] in points {
+        while next < x.len() {
+            few[count] = [x[next], y[next], z[next]];
+            count += 1;
+            next += step;
+        }
+        next -= x.len();
+    }
+    (few, count)
+}
 
 /// The curvatures a and b of the paraboloid `w₀ − a·s² − b·t²` that fits points `(s², t², w)` best.
 pub(super) fn paraboloid(points: impl Iterator<Item = (f64, f64, f64)>) -> (f64, f64) {
-    let mut n = Matrix3::zeros();
-    let mut right = Vector3::zeros();
+    // The normal equations: sums of products of 1, s, t and w.
+    let (mut count, mut sums) = (0.0, [0.0; 8]);
     for (s, t, w) in points {
-        let row = Vector3::new(1.0, s, t);
-        n += row * row.transpose();
-        right += row * w;
+        count += 1.0;
+        let products = [s, t, s * s, s * t, t * t, w, s * w, t * w];
+        for (sum, product) in sums.iter_mut().zip(products) {
+            *sum += product;
+        }
     }
+    let [s, t, ss, st, tt, w, sw, tw] = sums;
     // A single line of points has no curvature across it.
-    n += Matrix3::identity() * (1.0e-6 * n[(0, 0)]);
+    let lean = 1.0e-6 * count;
+    let n = Matrix3::new(count + lean, s, t, s, ss + lean, st, t, st, tt + lean);
+    let right = Vector3::new(w, sw, tw);
     let fit = n.try_inverse().map(|inverse| inverse * right);
     fit.filter(|f| f.iter().all(|c| c.is_finite()))
         .map_or((0.0, 0.0), |f| (-f[1], -f[2]))

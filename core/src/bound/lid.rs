@@ -1,15 +1,16 @@
 //! Lids: pieces of the part as the hierarchy bounds them, eight at a time, for one position or for several
 //! that are close to each other.
 
-use fearless_simd::{Simd, f32x8, mask32x8, prelude::*};
+use fearless_simd::{Simd, f32x8, f64x8, mask32x8, prelude::*};
 
-use super::fit::{FIT, axes, paraboloid};
+use super::fit::{axes, few, paraboloid};
 use super::{Eight, Slopes, dot3, load, turn};
 use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::LANES;
 use crate::simd::Set;
 use crate::vector::{Interval, Point, add_scaled, dot, length, sub};
+use crate::vertices::{Axes, eight, eights};
 
 /// Where the lids of a tree are: what rounding has to be measured by.
 #[derive(Debug, Clone, Copy)]
@@ -34,7 +35,7 @@ impl Frame {
 /// and v, the second square to the spindle; along its normal it stays under a paraboloid, which follows
 /// its curvature, and over a floor: for `s`, `t` in [−1, 1]
 /// `p = middle + s·u + t·v + w·normal`, `−below ≤ w ≤ above − a·s² − b·t²`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub(crate) struct Lids {
     middle: [[f32; LANES]; 3],
@@ -66,42 +67,59 @@ impl Lids {
         radius: [0.0; LANES],
     };
 
-    /// Puts a snug lid around points into a lane.
-    pub fn set(&mut self, lane: usize, frame: &Frame, points: &[Point]) {
-        let origin = [frame.origin, 0.0, 0.0];
+    /// Puts a snug lid around points, at least one of them, into a lane.
+    #[inline(always)]
+    pub fn set<'a, S: Simd>(
+        &mut self,
+        simd: S,
+        lane: usize,
+        frame: &Frame,
+        points: impl Iterator<Item = Axes<'a>> + Clone,
+    ) {
         // A few points tell the axes and the curvature well; that the lid holds all is for the rest.
-        let some = || points.iter().copied().step_by(points.len().div_ceil(FIT));
-        let axes = axes(some());
-        let mut ranges = [Interval::EMPTY; 3];
-        for &p in points {
-            for (range, &axis) in ranges.iter_mut().zip(&axes) {
-                let along = dot(sub(p, origin), axis);
-                range.low = range.low.min(along);
-                range.high = range.high.max(along);
+        let (few, count) = few(points.clone());
+        let few = &few[..count];
+        let axes = axes(few.iter().copied());
+        let [mut low, mut high] =
+            [f64::INFINITY, f64::NEG_INFINITY].map(|end| [f64x8::splat(simd, end); 3]);
+        for part in points.clone() {
+            for at in eights(part) {
+                let p = eight(simd, part, at, frame.origin);
+                for k in 0..3 {
+                    let along = project(p, axes[k]);
+                    (low[k], high[k]) = (low[k].min(along), high[k].max(along));
+                }
             }
         }
-        let half = ranges.map(|r| (r.high - r.low) / 2.0);
         let mut middle = [0.0; 3];
-        for (range, &axis) in ranges.iter().zip(&axes) {
-            middle = add_scaled(middle, (range.low + range.high) / 2.0, axis);
+        let mut half = [0.0; 3];
+        for k in 0..3 {
+            let (low, high) = (low[k].reduce_min(), high[k].reduce_max());
+            half[k] = (high - low) / 2.0;
+            middle = add_scaled(middle, (low + high) / 2.0, axes[k]);
         }
         let inverse = half.map(|h| if h > 0.0 { 1.0 / h } else { 0.0 });
-        let local = |p: Point| {
-            let r = sub(sub(p, origin), middle);
+        let (a, b) = paraboloid(few.iter().map(|&[x, y, z]| {
+            let r = sub([x - frame.origin, y, z], middle);
             let (s, t) = (dot(r, axes[0]) * inverse[0], dot(r, axes[1]) * inverse[1]);
-            (s * s, t * t, dot(r, axes[2]), r)
-        };
-        let (a, b) = paraboloid(some().map(|p| {
-            let (s, t, w, _) = local(p);
-            (s, t, w)
+            (s * s, t * t, dot(r, axes[2]))
         }));
-        let (mut above, mut along, mut square) = (f64::NEG_INFINITY, 0.0_f64, 0.0_f64);
-        for &p in points {
-            let (s, t, w, [x, y, z]) = local(p);
-            above = above.max(w + a * s + b * t);
-            along = along.max(x.abs());
-            square = square.max(y * y + z * z);
+        let none = f64x8::splat(simd, 0.0);
+        let (mut above, mut along, mut square) =
+            (f64x8::splat(simd, f64::NEG_INFINITY), none, none);
+        for part in points {
+            for at in eights(part) {
+                let [x, y, z] = eight(simd, part, at, frame.origin);
+                let r = [x - middle[0], y - middle[1], z - middle[2]];
+                let s = project(r, axes[0]) * inverse[0];
+                let t = project(r, axes[1]) * inverse[1];
+                let w = project(r, axes[2]);
+                above = above.max(w + s * s * a + t * t * b);
+                along = along.max(r[0].abs());
+                square = square.max(r[1] * r[1] + r[2] * r[2]);
+            }
         }
+        let (above, along, square) = (above.reduce_max(), along.reduce_max(), square.reduce_max());
         // Rounding to single precision moves the middle, turns the axes and shortens them.
         let size = length(middle) + half[0] + half[1] + half[2] + a.abs() + b.abs();
         let lost = f64::from(8.0 * f32::EPSILON) * size;
@@ -120,6 +138,12 @@ impl Lids {
         self.along[lane] = (along + lost) as f32;
         self.radius[lane] = (square.sqrt() + lost) as f32;
     }
+}
+
+/// Eight scalar products.
+#[inline(always)]
+fn project<S: Simd>([x, y, z]: [f64x8<S>; 3], axis: Point) -> f64x8<S> {
+    x * axis[0] + y * axis[1] + z * axis[2]
 }
 
 /// A position as the bounds of lids see it.
@@ -418,9 +442,19 @@ mod tests {
             .collect();
         let across = points.iter().map(|p| p[1].hypot(p[2])).fold(0.0, f64::max);
         let frame = Frame::new(Interval::of(points.iter().map(|p| p[0])), across);
-        let mut held = Lids::EMPTY;
-        held.set(3, &frame, &points);
-        (points, frame, held)
+        let axes = [0, 1, 2].map(|k| points.iter().map(|p| p[k]).collect::<Vec<f64>>());
+        let parts = std::iter::once(axes.each_ref().map(|axis| &axis[..]));
+        let held = Level::available().into_iter().map(|level| {
+            let mut held = Lids::EMPTY;
+            with_simd!(level.token(), simd => held.set(simd, 3, &frame, parts.clone()));
+            held
+        });
+        let held: Vec<Lids> = held.collect();
+        assert!(
+            held.iter().all(|h| *h == held[0]),
+            "a lid is the same at each level"
+        );
+        (points, frame, held[0])
     }
 
     proptest! {

@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use crate::error::{Error, Result, bounded};
+use crate::evaluate::Net;
 use crate::part::{Mesh, Part, Shape};
 use crate::surface::{Direction, Surface};
 use crate::vector::{Point, add_scaled, cross, length, sub};
@@ -45,9 +46,13 @@ pub(super) struct Samples {
 /// # Errors
 /// [`Error::OutOfBounds`] for a spacing that is not positive, [`Error::TooManySamples`].
 pub(super) fn sample(part: &Part, spacing: Option<f64>) -> Result<Samples> {
-    let nets: Vec<Net> = part.bodies.iter().map(|b| Net::new(&b.shape)).collect();
-    let [area, line, count] = nets.iter().fold([0.0; 3], |sum, net| {
-        let size = net.size();
+    let bodies: Vec<Measured> = part
+        .bodies
+        .iter()
+        .map(|b| Measured::new(&b.shape))
+        .collect();
+    let [area, line, count] = bodies.iter().fold([0.0; 3], |sum, body| {
+        let size = body.size();
         std::array::from_fn(|k| sum[k] + size[k])
     });
     let spacing = match spacing {
@@ -69,11 +74,11 @@ pub(super) fn sample(part: &Part, spacing: Option<f64>) -> Result<Samples> {
         });
     }
     let mut points = Vec::with_capacity(expected as usize);
-    let mut ends = Vec::with_capacity(nets.len());
-    for net in &nets {
-        match net {
-            Net::Surface(net) => points.extend(net.sample(spacing)),
-            Net::Mesh(mesh, _) => sample_mesh(mesh, spacing, &mut points),
+    let mut ends = Vec::with_capacity(bodies.len());
+    for body in &bodies {
+        match body {
+            Measured::Surface(surface) => points.extend(surface.sample(spacing)),
+            Measured::Mesh(mesh, _) => sample_mesh(mesh, spacing, &mut points),
         }
         ends.push(points.len());
     }
@@ -85,16 +90,16 @@ pub(super) fn sample(part: &Part, spacing: Option<f64>) -> Result<Samples> {
 }
 
 /// A body, measured.
-enum Net<'a> {
-    Surface(SurfaceNet<'a>),
+enum Measured<'a> {
+    Surface(MeasuredSurface<'a>),
     /// With its area, mm².
     Mesh(&'a Mesh, f64),
 }
 
-impl<'a> Net<'a> {
+impl<'a> Measured<'a> {
     fn new(shape: &'a Shape) -> Self {
         match shape {
-            Shape::Surface(surface) => Self::Surface(SurfaceNet::new(surface)),
+            Shape::Surface(surface) => Self::Surface(MeasuredSurface::new(surface)),
             Shape::Mesh(mesh) => Self::Mesh(mesh, areas(mesh).sum()),
         }
     }
@@ -103,9 +108,13 @@ impl<'a> Net<'a> {
     /// lines (mm) that are sampled in any case; and points likewise.
     fn size(&self) -> [f64; 3] {
         match self {
-            Self::Surface(net) => {
-                let (u, v) = (net.u.forced.len() as f64, net.forced_v.len() as f64);
-                [net.area, u * net.widest + v * net.u.total(), u * v]
+            Self::Surface(surface) => {
+                let MeasuredSurface {
+                    u, forced_v, area, ..
+                } = surface;
+                let (rows, columns) = (u.forced.len() as f64, forced_v.len() as f64);
+                let lines = rows * surface.widest + columns * u.total();
+                [*area, lines, rows * columns]
             }
             Self::Mesh(mesh, area) => [*area, 0.0, mesh.vertices().len() as f64],
         }
@@ -113,8 +122,8 @@ impl<'a> Net<'a> {
 }
 
 /// A surface with what its parameters mean in millimetres.
-struct SurfaceNet<'a> {
-    surface: &'a Surface,
+struct MeasuredSurface<'a> {
+    net: Net<'a>,
     /// Along u; each interval as long as the longest isoline makes it.
     u: Scale,
     vs: Vec<f64>,
@@ -124,10 +133,11 @@ struct SurfaceNet<'a> {
     widest: f64,
 }
 
-impl<'a> SurfaceNet<'a> {
+impl<'a> MeasuredSurface<'a> {
     fn new(surface: &'a Surface) -> Self {
         let (us, vs) = (measured(surface.u()), measured(surface.v()));
-        let points = surface.grid(&us, &vs);
+        let net = Net::new(surface);
+        let points = net.grid(&us, &vs);
         let rows: Vec<&[Point]> = points.chunks_exact(vs.len()).collect();
         let steps: Vec<f64> = rows
             .windows(2)
@@ -139,7 +149,7 @@ impl<'a> SurfaceNet<'a> {
         let girths: Vec<f64> = rows.iter().map(|r| chords(r).sum()).collect();
         let between = girths.windows(2).map(|g| 0.5 * (g[0] + g[1]));
         Self {
-            surface,
+            net,
             area: steps.iter().zip(between).map(|(s, g)| s * g).sum(),
             widest: girths.iter().copied().fold(0.0, f64::max),
             u: Scale::new(us, steps, creases(surface.u())),
@@ -158,12 +168,12 @@ impl<'a> SurfaceNet<'a> {
         let sampled: Vec<Vec<Point>> = rows
             .into_par_iter()
             .map(|(row, u)| {
-                let isoline = self.surface.grid(&[u], &self.vs);
+                let isoline = self.net.grid(&[u], &self.vs);
                 let lengths = chords(&isoline).collect();
                 let v = Scale::new(self.vs.clone(), lengths, self.forced_v.clone());
                 // Each row begins its own run of offsets.
                 let phase = (row as f64 * PLASTIC[0]).fract();
-                self.surface.grid(&[u], &v.places(spacing, phase))
+                self.net.grid(&[u], &v.places(spacing, phase))
             })
             .collect();
         sampled.concat()

@@ -3,7 +3,7 @@
 //! The edges bound a region of the domain; if none of them runs inside it, that region is the
 //! domain. Seams of closed surfaces and collapsed sides are boundaries as any other.
 
-use horma_core::{Direction, Point, Surface, length, sub};
+use horma_core::{Direction, Net, Point, Surface, length, sub};
 use step_io::scene::{CurveKind, Edge, Face, NurbsCurve};
 
 use crate::error::{Error, Result};
@@ -34,7 +34,8 @@ pub(super) fn check(
         name: name.to_owned(),
     };
     let transposed = surface.transposed();
-    let sides: Vec<Side> = [surface, &transposed].into_iter().flat_map(sides).collect();
+    let nets = [Net::new(surface), Net::new(&transposed)];
+    let sides: Vec<Side> = nets.iter().flat_map(sides).collect();
     let precision = precision.unwrap_or(0.0) * scale;
     let tolerance = precision.clamp(TOLERANCE.0, TOLERANCE.1) + RELATIVE * size(surface);
     for bound in face.bounds() {
@@ -67,20 +68,20 @@ fn trimmed(name: &str) -> Error {
 
 /// One side of the domain: `u = at`, tabulated.
 struct Side<'a> {
-    surface: &'a Surface,
+    net: &'a Net<'a>,
     at: f64,
     vs: Vec<f64>,
     points: Vec<Point>,
 }
 
 /// The sides `u = first` and `u = last`.
-fn sides(surface: &Surface) -> [Side<'_>; 2] {
-    let (first, last) = surface.u().domain();
+fn sides<'a>(net: &'a Net<'a>) -> [Side<'a>; 2] {
+    let (first, last) = net.surface.u().domain();
     [first, last].map(|at| {
-        let vs = parameters(surface.v(), POINTS);
-        let points = surface.grid(&[at], &vs);
+        let vs = parameters(net.surface.v(), POINTS);
+        let points = net.grid(&[at], &vs);
         Side {
-            surface,
+            net,
             at,
             vs,
             points,
@@ -129,7 +130,7 @@ fn passes(side: &Side, nearest: usize, point: Point, tolerance: f64) -> bool {
     for _ in 0..DIVISIONS {
         let width = (high - low) / PARTS as f64;
         let vs: Vec<f64> = (0..=PARTS).map(|i| low + width * i as f64).collect();
-        let points = side.surface.grid(&[side.at], &vs);
+        let points = side.net.grid(&[side.at], &vs);
         let Some((nearest, distance)) = nearest_of(&points, point) else {
             return false;
         };

@@ -1,0 +1,104 @@
+//! The vertices under a hierarchy, leaf by leaf and a coordinate at a time: what its lids are set around.
+
+use std::ops::Range;
+
+use fearless_simd::{Simd, f64x8, prelude::*};
+use rayon::prelude::*;
+
+use crate::blocks::Block;
+use crate::bound::Frame;
+use crate::lanes::LANES;
+use crate::vector::{Interval, Point};
+
+/// Leaves of which the vertices are gathered together.
+const LOT: usize = 512;
+
+/// The vertices of all leaves, in order.
+pub(crate) struct Vertices(Vec<Lot>);
+
+/// Those of some leaves.
+#[derive(Default)]
+struct Lot {
+    at: [Vec<f64>; 3],
+    /// Where those of each leaf begin, and where the last end.
+    starts: Vec<usize>,
+}
+
+/// Points, a coordinate at a time.
+pub(crate) type Axes<'a> = [&'a [f64]; 3];
+
+impl Vertices {
+    /// Those that `vertices` leaves to its last argument for each leaf's block, gathered in parallel on the
+    /// current thread pool.
+    pub fn of(
+        blocks: &[Block],
+        vertices: impl Fn(&Block, &mut dyn FnMut(Point)) + Sync + Send,
+    ) -> Self {
+        let lots = blocks.par_chunks(LOT).map(|blocks| {
+            let mut lot = Lot::default();
+            for block in blocks {
+                lot.starts.push(lot.at[0].len());
+                vertices(block, &mut |p| {
+                    for (all, own) in lot.at.iter_mut().zip(p) {
+                        all.push(own);
+                    }
+                });
+            }
+            lot.starts.push(lot.at[0].len());
+            lot
+        });
+        Self(lots.collect())
+    }
+
+    /// Those of some leaves.
+    pub fn under(&self, leaves: Range<usize>) -> impl Iterator<Item = Axes<'_>> + Clone {
+        let lots = leaves.start / LOT..leaves.end.div_ceil(LOT);
+        lots.map(move |number| {
+            let lot = &self.0[number];
+            let within = |leaf: usize| (leaf - number * LOT).min(lot.starts.len() - 1);
+            let from = lot.starts[within(leaves.start.max(number * LOT))];
+            let to = lot.starts[within(leaves.end)];
+            lot.at.each_ref().map(|axis| &axis[from..to])
+        })
+    }
+
+    /// Where they are.
+    pub fn frame(&self) -> Frame {
+        let x = Interval::of(self.0.iter().flat_map(|lot| lot.at[0].iter().copied()));
+        let across = self
+            .0
+            .iter()
+            .flat_map(|lot| lot.at[1].iter().zip(&lot.at[2]));
+        let square = across.map(|(y, z)| y * y + z * z).fold(0.0, f64::max);
+        Frame::new(x, square.sqrt())
+    }
+}
+
+/// Where to begin with eight points at a time: at most at the last eight.
+#[inline(always)]
+pub(crate) fn eights([x, ..]: Axes) -> impl Iterator<Item = usize> {
+    let last = x.len().saturating_sub(LANES);
+    (0..x.len()).step_by(LANES).map(
+        #[inline(always)]
+        move |at| at.min(last),
+    )
+}
+
+/// Eight points from `at` on, x counted from `origin`; if there are not so many, some again.
+#[inline(always)]
+pub(crate) fn eight<S: Simd>(simd: S, points: Axes, at: usize, origin: f64) -> [f64x8<S>; 3] {
+    let all = points[0].len();
+    let mut some = [[0.0; LANES]; 3];
+    for (some, from) in some.iter_mut().zip(points) {
+        match from.get(at..at + LANES) {
+            Some(from) => some.copy_from_slice(from),
+            None => (0..LANES).for_each(|i| some[i] = from[i % all]),
+        }
+    }
+    let [x, y, z] = some;
+    [
+        f64x8::from_slice(simd, &x) - origin,
+        f64x8::from_slice(simd, &y),
+        f64x8::from_slice(simd, &z),
+    ]
+}
