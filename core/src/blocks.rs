@@ -155,7 +155,7 @@ pub(crate) fn point_vertices(rows: &[Row], block: &Block, take: &mut dyn FnMut(P
 pub(crate) fn point_leaf(rows: &[Row], block: &Block) -> PointLeaf {
     let mut leaf = PointLeaf::EMPTY;
     each_point(rows, block, |row, i| {
-        leaf.push(row.candidate(i), row.points[i])
+        leaf.push(row.candidate(i), row.points[i]);
     });
     leaf
 }

@@ -1,39 +1,37 @@
 //! Surfaces on grids of parameters: points, one isoline at a time.
 //!
 //! An isoline collapses the net of poles to one curve, once for its u, and that curve is evaluated
-//! at every v with basis functions computed once for the grid. Coordinates lie in arrays of their
-//! own and the places that weigh the same poles are computed together, so that the inner loops are
-//! sums of products over arrays, which a compiler turns into vector instructions. Only + − × ÷ are
-//! used, each place sees them in one fixed order, and none are fused: a point is the same bits
-//! wherever, beside whichever other points, and on however wide a machine it is computed.
+//! at every v with basis functions computed once for the grid, four places at a time that weigh the
+//! same poles. Only + − × ÷ are used, each place sees them in one fixed order, and none are fused: a
+//! point is the same bits wherever, beside whichever other points, and on however wide a machine it is
+//! computed.
 //!
 //! Nothing is remembered between grids, and no parameter outside the domain is caught.
 
 use std::ops::Range;
 
+use fearless_simd::{Simd, f64x4, prelude::*};
+
+use crate::fours::FOUR;
+use crate::simd::{Token, with_simd};
 use crate::surface::{Basis, Surface};
 use crate::vector::Point;
 
-/// A surface made ready to be evaluated, with its poles a coordinate at a time.
+/// A surface made ready to be evaluated.
 pub struct Net<'a> {
     /// The surface.
     pub surface: &'a Surface,
-    /// Coordinates and weights of the poles.
-    poles: Coordinates,
+    /// Its poles with a 1 each, for what weighs them.
+    poles: Vec<[f64; FOUR]>,
 }
 
 impl<'a> Net<'a> {
     /// Copies the poles, which is worth it once for several grids.
     pub fn new(surface: &'a Surface) -> Self {
-        let coordinate = |k: usize| surface.poles().iter().map(|p| p[k]).collect();
+        let poles = surface.poles().iter().map(|&[x, y, z]| [x, y, z, 1.0]);
         Self {
             surface,
-            poles: Coordinates {
-                x: coordinate(0),
-                y: coordinate(1),
-                z: coordinate(2),
-                w: surface.weights().unwrap_or_default().to_vec(),
-            },
+            poles: poles.collect(),
         }
     }
 
@@ -45,7 +43,7 @@ impl<'a> Net<'a> {
         let mut points = Vec::with_capacity(us.len() * vs.len());
         for &u in us {
             isolines.at(u, &mut line);
-            points.extend((0..vs.len()).map(|i| line.points.point(i)));
+            points.extend((0..vs.len()).map(|i| line.point(i)));
         }
         points
     }
@@ -56,241 +54,158 @@ pub(crate) struct Isolines<'a> {
     net: &'a Net<'a>,
     /// The poles along v that any of them weighs.
     poles: Range<usize>,
-    /// Basis functions at each v: all of the first that does not vanish, then all of the second …
-    shares: Vec<f64>,
-    /// Places that weigh the same poles and follow each other.
-    runs: Vec<Run>,
+    fours: Vec<Places>,
+    /// For each four, the basis functions at its places: all of the first that does not vanish, then all
+    /// of the second …
+    shares: Vec<[f64; FOUR]>,
     columns: usize,
 }
 
-struct Run {
-    first_pole: usize,
+/// Up to four places that weigh the same poles and follow each other.
+struct Places {
     start: usize,
-    end: usize,
+    first_pole: usize,
 }
 
-/// Points, or poles and their weights, a coordinate at a time.
-#[derive(Default)]
-pub(crate) struct Coordinates {
-    pub x: Vec<f64>,
-    pub y: Vec<f64>,
-    pub z: Vec<f64>,
-    /// Empty if the surface is not rational.
-    w: Vec<f64>,
-}
-
-impl Coordinates {
-    pub fn point(&self, i: usize) -> Point {
-        [self.x[i], self.y[i], self.z[i]]
-    }
-
-    /// Every `step`-th point from each of the first `step` on: all that are first in their cells, then
-    /// all that are second …
-    pub fn deal(&mut self, from: &Self, step: usize) {
-        let pairs = [
-            (&mut self.x, &from.x),
-            (&mut self.y, &from.y),
-            (&mut self.z, &from.z),
-        ];
-        for (to, from) in pairs {
-            let n = from.len() / step;
-            to.resize(n * step, 0.0);
-            if step == 4 {
-                deal_four(to, from);
-                continue;
-            }
-            for (b, to) in to.chunks_exact_mut(n).enumerate() {
-                for (to, from) in to.iter_mut().zip(from[b..].iter().step_by(step)) {
-                    *to = *from;
-                }
-            }
-        }
-    }
-
-    fn resize(&mut self, len: usize, rational: bool) {
-        for c in [&mut self.x, &mut self.y, &mut self.z] {
-            c.resize(len, 0.0);
-        }
-        self.w.resize(if rational { len } else { 0 }, 0.0);
-    }
-
-    fn clear(&mut self, len: usize, rational: bool) {
-        for c in [&mut self.x, &mut self.y, &mut self.z] {
-            c.clear();
-            c.resize(len, 0.0);
-        }
-        self.w.clear();
-        self.w.resize(if rational { len } else { 0 }, 0.0);
-    }
-}
-
-/// Room for an isoline and for its poles, used again for the next one.
+/// Points of an isoline, a coordinate at a time, and room for its poles; used again for the next one.
 #[derive(Default)]
 pub(crate) struct Isoline {
-    pub points: Coordinates,
-    curve: Coordinates,
+    /// The isocurve's poles times their weights, and these.
+    curve: Vec<[f64; FOUR]>,
+    /// Coordinates of the points, and what they are to be divided by. Longer than there are points, so that the last
+    /// four of them are whole.
+    at: [Vec<f64>; FOUR],
+}
+
+impl Isoline {
+    pub fn point(&self, i: usize) -> Point {
+        [self.at[0][i], self.at[1][i], self.at[2][i]]
+    }
+
+    /// The points of a range, a coordinate at a time.
+    pub fn within(&self, range: Range<usize>) -> [&[f64]; 3] {
+        [0, 1, 2].map(|k| &self.at[k][range.clone()])
+    }
 }
 
 impl<'a> Isolines<'a> {
     /// Computes the basis functions at every v.
     pub fn new(net: &'a Net<'a>, vs: &[f64]) -> Self {
-        let surface = net.surface;
-        let order = surface.v().degree + 1;
-        let mut shares = vec![0.0; order * vs.len()];
-        let mut runs: Vec<Run> = Vec::new();
+        let order = net.surface.v().degree + 1;
+        let mut fours: Vec<Places> = Vec::with_capacity(vs.len());
+        let mut shares = Vec::with_capacity(order * vs.len());
         for (i, &v) in vs.iter().enumerate() {
-            let basis = surface.v().basis(v);
-            for (k, &share) in basis.values[..order].iter().enumerate() {
-                shares[k * vs.len() + i] = share;
-            }
-            match runs.last_mut().filter(|r| r.first_pole == basis.first) {
-                Some(run) => run.end = i + 1,
-                None => runs.push(Run {
-                    first_pole: basis.first,
+            let Basis { first, values } = net.surface.v().basis(v);
+            let follows = |p: &&Places| p.first_pole == first && i < p.start + FOUR;
+            let start = fours.last().filter(follows).map(|p| p.start);
+            let start = start.unwrap_or_else(|| {
+                fours.push(Places {
                     start: i,
-                    end: i + 1,
-                }),
+                    first_pole: first,
+                });
+                shares.resize(order * fours.len(), [0.0; FOUR]);
+                i
+            });
+            let own = &mut shares[order * (fours.len() - 1)..];
+            for (own, share) in own.iter_mut().zip(values) {
+                own[i - start] = share;
             }
         }
-        let first = runs.iter().map(|r| r.first_pole).min().unwrap_or(0);
-        let last = runs.iter().map(|r| r.first_pole + order).max().unwrap_or(0);
+        let first = fours.iter().map(|p| p.first_pole).min().unwrap_or(0);
+        let last = fours.iter().map(|p| p.first_pole + order).max();
         Self {
             net,
-            poles: first..last,
+            poles: first..last.unwrap_or(0),
+            fours,
             shares,
-            runs,
             columns: vs.len(),
         }
     }
 
     /// The points at `u` and every v.
     pub fn at(&self, u: f64, line: &mut Isoline) {
-        let surface = self.net.surface;
-        self.collapse(&surface.u().basis(u), &mut line.curve);
-        let rational = surface.weights().is_some();
-        line.points.resize(self.columns, rational);
-        let (curve, points) = (&line.curve, &mut line.points);
-        match surface.v().degree {
-            1 => self.evaluate::<2>(curve, points),
-            2 => self.evaluate::<3>(curve, points),
-            3 => self.evaluate::<4>(curve, points),
-            5 => self.evaluate::<6>(curve, points),
-            _ => self.evaluate_any(curve, points),
+        let basis = self.net.surface.u().basis(u);
+        for c in &mut line.at {
+            c.resize(self.columns + FOUR - 1, 1.0);
         }
-        let Coordinates { x, y, z, w } = points;
-        for c in [x, y, z] {
+        with_simd!(Token::best(), simd => self.fill(simd, &basis, line));
+    }
+
+    #[inline(always)]
+    fn fill<S: Simd>(&self, simd: S, basis: &Basis, line: &mut Isoline) {
+        self.collapse(simd, basis, &mut line.curve);
+        let (curve, at) = (&line.curve[..], &mut line.at);
+        if self.net.surface.weights().is_none() {
+            return self.evaluate::<_, 3>(simd, curve, at);
+        }
+        self.evaluate::<_, 4>(simd, curve, at);
+        let [points @ .., w] = at;
+        for c in points {
             for (c, w) in c.iter_mut().zip(w.iter()) {
                 *c /= w;
             }
         }
     }
 
-    /// The isocurve's homogeneous poles.
-    fn collapse(&self, basis: &Basis, curve: &mut Coordinates) {
+    /// The isocurve's poles.
+    #[inline(always)]
+    fn collapse<S: Simd>(&self, simd: S, basis: &Basis, curve: &mut Vec<[f64; FOUR]>) {
         let Net { surface, poles } = self.net;
-        let n = surface.v().count();
-        let rational = surface.weights().is_some();
-        curve.clear(self.poles.len(), rational);
-        for i in 0..=surface.u().degree {
-            let share = basis.values[i];
-            let row = (basis.first + i) * n;
-            let from = row + self.poles.start..row + self.poles.end;
-            let pairs = [
-                (&mut curve.x, &poles.x),
-                (&mut curve.y, &poles.y),
-                (&mut curve.z, &poles.z),
-            ];
-            if !rational {
-                for (sums, values) in pairs {
-                    add(sums, share, &values[from.clone()]);
-                }
-                continue;
+        let (n, degree) = (surface.v().count(), surface.u().degree);
+        curve.clear();
+        for j in self.poles.clone() {
+            let mut sum = f64x4::splat(simd, 0.0);
+            for i in 0..=degree {
+                let k = (basis.first + i) * n + j;
+                let share = match surface.weights() {
+                    Some(weights) => weights[k] * basis.values[i],
+                    None => basis.values[i],
+                };
+                sum += f64x4::from_slice(simd, &poles[k]) * share;
             }
-            let weights = &poles.w[from.clone()];
-            for (sums, values) in pairs {
-                add_weighted(sums, share, weights, &values[from.clone()]);
-            }
-            add(&mut curve.w, share, weights);
+            curve.push(*sum);
         }
     }
 
-    /// The curve at every v, for the usual degrees: sums stay in registers.
-    fn evaluate<const ORDER: usize>(&self, curve: &Coordinates, points: &mut Coordinates) {
-        let Coordinates { x, y, z, w } = points;
-        let pairs = [(&curve.x, x), (&curve.y, y), (&curve.z, z), (&curve.w, w)];
-        let rational = !curve.w.is_empty();
-        let mut pairs = pairs.map(|(c, p)| (&c[..], &mut p[..]));
-        let pairs = if rational {
-            &mut pairs[..]
-        } else {
-            &mut pairs[..3]
-        };
-        for run in &self.runs {
-            let len = run.end - run.start;
-            let mut share: [&[f64]; ORDER] = [&[]; ORDER];
-            for (k, share) in share.iter_mut().enumerate() {
-                *share = &self.shares[k * self.columns + run.start..][..len];
-            }
-            let first = run.first_pole - self.poles.start;
-            for (curve, points) in pairs.iter_mut() {
-                let mut pole = [0.0; ORDER];
-                pole.copy_from_slice(&curve[first..first + ORDER]);
-                for (i, point) in points[run.start..][..len].iter_mut().enumerate() {
-                    let mut sum = 0.0;
-                    for k in 0..ORDER {
-                        sum += share[k][i] * pole[k];
-                    }
-                    *point = sum;
-                }
-            }
+    /// The first coordinates of the curve at every v.
+    #[inline(always)]
+    fn evaluate<S: Simd, const SOME: usize>(
+        &self,
+        simd: S,
+        curve: &[[f64; FOUR]],
+        at: &mut [Vec<f64>; FOUR],
+    ) {
+        // The usual degrees are unrolled.
+        match self.net.surface.v().degree {
+            1 => self.sum::<S, SOME>(simd, 2, curve, at),
+            2 => self.sum::<S, SOME>(simd, 3, curve, at),
+            3 => self.sum::<S, SOME>(simd, 4, curve, at),
+            5 => self.sum::<S, SOME>(simd, 6, curve, at),
+            degree => self.sum::<S, SOME>(simd, degree + 1, curve, at),
         }
     }
 
-    /// The curve at every v, for any degree: the same sums in the same order.
-    fn evaluate_any(&self, curve: &Coordinates, points: &mut Coordinates) {
-        let pairs = [
-            (&curve.x, &mut points.x),
-            (&curve.y, &mut points.y),
-            (&curve.z, &mut points.z),
-            (&curve.w, &mut points.w),
-        ];
-        for (curve, points) in pairs.into_iter().filter(|(c, _)| !c.is_empty()) {
-            points.fill(0.0);
-            for run in &self.runs {
-                for k in 0..=self.net.surface.v().degree {
-                    let shares = &self.shares[k * self.columns..];
-                    let points = &mut points[run.start..run.end];
-                    add(
-                        points,
-                        curve[run.first_pole - self.poles.start + k],
-                        &shares[run.start..run.end],
-                    );
+    #[inline(always)]
+    fn sum<S: Simd, const SOME: usize>(
+        &self,
+        simd: S,
+        order: usize,
+        curve: &[[f64; FOUR]],
+        at: &mut [Vec<f64>; FOUR],
+    ) {
+        for (places, shares) in self.fours.iter().zip(self.shares.chunks_exact(order)) {
+            let poles = &curve[places.first_pole - self.poles.start..][..order];
+            let mut sums = [f64x4::splat(simd, 0.0); SOME];
+            for k in 0..order {
+                let share = f64x4::from_slice(simd, &shares[k]);
+                for c in 0..SOME {
+                    sums[c] += share * poles[k][c];
                 }
             }
+            // Of less than four places the rest is put right when it is the next ones' turn.
+            for c in 0..SOME {
+                sums[c].store_slice(&mut at[c][places.start..places.start + FOUR]);
+            }
         }
-    }
-}
-
-/// The usual step, in one pass.
-fn deal_four(to: &mut [f64], from: &[f64]) {
-    let n = from.len() / 4;
-    let (a, rest) = to.split_at_mut(n);
-    let (b, rest) = rest.split_at_mut(n);
-    let (c, d) = rest.split_at_mut(n);
-    let d = &mut d[..n];
-    for (i, from) in from.chunks_exact(4).enumerate() {
-        (a[i], b[i], c[i], d[i]) = (from[0], from[1], from[2], from[3]);
-    }
-}
-
-fn add(sums: &mut [f64], share: f64, values: &[f64]) {
-    for (sum, value) in sums.iter_mut().zip(values) {
-        *sum += share * value;
-    }
-}
-
-fn add_weighted(sums: &mut [f64], share: f64, weights: &[f64], values: &[f64]) {
-    for ((sum, weight), value) in sums.iter_mut().zip(weights).zip(values) {
-        *sum += weight * share * value;
     }
 }

@@ -93,7 +93,7 @@ impl SurfaceGrid {
         let mut line = Isoline::default();
         for &(id, u) in &self.us {
             isolines.at(u, &mut line);
-            let point = |j| self.coordinates.round(line.points.point(j));
+            let point = |j| self.coordinates.round(line.point(j));
             let points = (0..self.vs.len()).map(point);
             take(Row {
                 id,

@@ -93,6 +93,7 @@ mod extent;
 mod plan;
 mod runs;
 
+mod fours;
 mod simd;
 
 mod contact;

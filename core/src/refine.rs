@@ -68,8 +68,8 @@ pub(crate) fn refine(name: &str, surface: &Surface, tolerance: f64) -> Result<Li
     }
     let mut grid = lay(surface, &bends, &densities);
     for _ in 0..ADJUSTMENTS {
-        let found = probed(&net, &grid, tolerance);
-        let cells = bends_found(&bends, [&grid.us, &grid.vs], &found);
+        let found = probe(&net, &grid);
+        let cells = bends_found(&bends, [&grid.us, &grid.vs], &found, GOAL * tolerance);
         grid = lay(surface, &cells, &adjust(&cells));
     }
     let mut measured = measure_all(&net, &grid, tolerance);
@@ -93,15 +93,6 @@ pub(crate) fn refine(name: &str, surface: &Surface, tolerance: f64) -> Result<Li
         };
     }
     Err(not_reached(&grid, &measured))
-}
-
-/// What is found by [`probe`], in units of what a grid is laid to.
-fn probed(net: &Net, grid: &Grid, tolerance: f64) -> Vec<[f64; 3]> {
-    let mut found = probe(net, grid);
-    for d in &mut found {
-        *d = d.map(|d| d / (GOAL * tolerance));
-    }
-    found
 }
 
 fn fits(rows: f64, columns: f64) -> bool {

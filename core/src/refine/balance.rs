@@ -8,6 +8,7 @@
 //! are a fraction of a line too many at most between two creases. Nothing is measured here.
 
 use super::curvature::{Bends, Slots};
+use crate::simd::{Token, with_simd};
 
 /// Steps of the descent, the first one's length, and what each leaves of it.
 const STEPS: usize = 24;
@@ -52,14 +53,20 @@ pub(super) fn balance(bends: &Bends) -> Densities {
     let mut v: Vec<f64> = least.iter().map(|l| l * std::f64::consts::SQRT_2).collect();
     let mut step = FIRST;
     let mut best = (f64::INFINITY, v.clone());
-    let mut row = Row::new(n);
+    let mut needed = vec![0.0; n];
     let mut u = vec![0.0; m];
     let mut shares = vec![0.0; m * n];
     for _ in 0..STEPS {
         let sizes: Vec<f64> = v.iter().map(|v| 1.0 / v).collect();
         for k in 0..m {
             let shares = &mut shares[k * n..(k + 1) * n];
-            u[k] = row.needed(bends, k, &sizes, floor_u[k], shares);
+            let row = Row::new(bends, k, &sizes);
+            u[k] = row.most(floor_u[k], &mut needed);
+            if u[k] > floor_u[k] {
+                row.shares(u[k], &mut needed, shares);
+            } else {
+                shares.fill(0.0);
+            }
         }
         let points = total(&u, &bends.us) * total(&v, &bends.vs);
         if points < best.0 {
@@ -134,21 +141,26 @@ pub(super) fn adjust(bends: &Bends) -> Densities {
 fn settle(bends: &Bends, v: &[f64], floor_u: &[f64], least: &[f64]) -> Densities {
     let n = bends.vs.len();
     let sizes: Vec<f64> = v.iter().map(|v| 1.0 / v).collect();
-    let mut row = Row::new(n);
-    let mut ignored = vec![0.0; n];
+    let mut needed = vec![0.0; n];
     let mut u: Vec<f64> = (0..bends.us.len())
-        .map(|k| row.needed(bends, k, &sizes, floor_u[k], &mut ignored))
+        .map(|k| Row::new(bends, k, &sizes).most(floor_u[k], &mut needed))
         .collect();
     grade(&mut u, &bends.us);
     let mut v = least.to_vec();
-    // As `needed`, with the directions exchanged; a row of u at a time, since v lies together.
+    let mut same = vec![0.0; n];
+    // As for u, with the directions exchanged; a row of u at a time, since v lies together.
     for (k, &density) in u.iter().enumerate() {
         // A hair smaller: where only u bends it takes the whole budget, and nothing is left to divide by.
-        let x = 0.999 / density;
-        for (l, v) in v.iter_mut().enumerate() {
-            let i = k * n + l;
-            let needed = density_needed(bends.v[i], bends.u[i], bends.twist[i], bends.both[i], x);
-            *v = v.max(needed);
+        same.fill(0.999 / density);
+        let row = Row::new(bends, k, &same);
+        let exchanged = Row {
+            own: row.other,
+            other: row.own,
+            ..row
+        };
+        with_simd!(Token::best(), _simd => exchanged.all(&mut needed));
+        for (v, needed) in v.iter_mut().zip(&needed) {
+            *v = v.max(*needed);
         }
     }
     grade(&mut v, &bends.vs);
@@ -175,44 +187,62 @@ fn density_needed(own: f64, other: f64, twist: f64, both: f64, y: f64) -> f64 {
     if added > split { added } else { split }
 }
 
-/// Work room for one row of slots.
-struct Row {
-    needed: Vec<f64>,
+/// The bends of one row of slots, those along u its own, and the sizes along v.
+struct Row<'a> {
+    own: &'a [f64],
+    other: &'a [f64],
+    twist: &'a [f64],
+    both: &'a [f64],
+    sizes: &'a [f64],
 }
 
-impl Row {
-    fn new(n: usize) -> Self {
+impl<'a> Row<'a> {
+    fn new(bends: &'a Bends, k: usize, sizes: &'a [f64]) -> Self {
+        let n = sizes.len();
+        let [own, other, twist, both] =
+            [&bends.u, &bends.v, &bends.twist, &bends.both].map(|b| &b[k * n..][..n]);
         Self {
-            needed: vec![0.0; n],
+            own,
+            other,
+            twist,
+            both,
+            sizes,
         }
     }
 
-    /// The density of u that the slots of row `k` need, and the share of each in it: by how much
-    /// the one falls as the other's v grows, spread over all that are nearly the worst.
-    fn needed(
-        &mut self,
-        bends: &Bends,
-        k: usize,
-        sizes: &[f64],
-        floor: f64,
-        shares: &mut [f64],
-    ) -> f64 {
-        let n = sizes.len();
-        let own = &bends.u[k * n..(k + 1) * n];
-        let other = &bends.v[k * n..(k + 1) * n];
-        let twist = &bends.twist[k * n..(k + 1) * n];
-        let both = &bends.both[k * n..(k + 1) * n];
+    /// The density of u that all slots need, at least `floor`; what each needs is left in `needed`.
+    fn most(&self, floor: f64, needed: &mut [f64]) -> f64 {
+        with_simd!(Token::best(), _simd => self.all(needed));
+        needed.iter().fold(floor, |a, &b| a.max(b))
+    }
+
+    /// The share of each slot in what is needed at most: by how much the one falls as the other's v grows,
+    /// spread over all that are nearly the worst. In place of what they need.
+    fn shares(&self, most: f64, needed: &mut [f64], shares: &mut [f64]) {
+        with_simd!(Token::best(), _simd => self.weighed(most, needed, shares));
+        let all: f64 = needed.iter().sum();
+        shares.iter_mut().for_each(|s| *s /= all);
+    }
+
+    #[inline(always)]
+    fn all(&self, needed: &mut [f64]) {
+        let (n, row) = (needed.len(), self);
+        let (own, other, sizes) = (&row.own[..n], &row.other[..n], &row.sizes[..n]);
+        let (twist, both) = (&row.twist[..n], &row.both[..n]);
         for l in 0..n {
-            self.needed[l] = density_needed(own[l], other[l], twist[l], both[l], sizes[l]);
+            needed[l] = density_needed(own[l], other[l], twist[l], both[l], sizes[l]);
         }
-        let most = self.needed.iter().fold(0.0, |a: f64, &b| a.max(b));
-        if most <= floor {
-            shares.fill(0.0);
-            return floor;
-        }
-        let mut all = 0.0;
+    }
+
+    /// What each needs becomes how near that is to the most, and the shares are weighed by it.
+    #[inline(always)]
+    fn weighed(&self, most: f64, needed: &mut [f64], shares: &mut [f64]) {
+        let (n, row) = (needed.len(), self);
+        let (own, other, sizes) = (&row.own[..n], &row.other[..n], &row.sizes[..n]);
+        let (twist, both) = (&row.twist[..n], &row.both[..n]);
+        let shares = &mut shares[..n];
         for l in 0..n {
-            let near = self.needed[l] / most;
+            let near = needed[l] / most;
             let near = near * near;
             let near = near * near;
             let near = near * near;
@@ -222,10 +252,8 @@ impl Row {
             let by_v = both[l] * other[l] * y * y + cxy;
             let by_u = own[l] * x * x + cxy;
             shares[l] = near * by_v / (by_u + 0.05 * by_v + 1e-30);
-            all += near;
+            needed[l] = near;
         }
-        shares.iter_mut().for_each(|s| *s /= all);
-        most
     }
 }
 

@@ -161,13 +161,22 @@ impl Bends {
 }
 
 /// The bends that a grid's cells were found to have: how far the middles of their sides along u,
-/// along v, and of the cells are off the facets, by rows and columns, in units of the tolerance.
-pub(super) fn bends_found(before: &Bends, [us, vs]: [&[f64]; 2], found: &[[f64; 3]]) -> Bends {
+/// along v, and of the cells are off the facets, by rows and columns, some rows together; these in units of
+/// what is good for a cell.
+pub(super) fn bends_found(
+    before: &Bends,
+    [us, vs]: [&[f64]; 2],
+    found: &[Vec<[f64; 3]>],
+    good: f64,
+) -> Bends {
     let n = vs.len() - 1;
-    let mut all = Bends::new([Slots::between(us), Slots::between(vs)], found.len());
-    for (k, row) in found.chunks_exact(n).enumerate() {
+    let pairs = (us.len() - 1) * n;
+    let mut all = Bends::new([Slots::between(us), Slots::between(vs)], pairs);
+    let rows = found.iter().flat_map(|rows| rows.chunks_exact(n));
+    for (k, row) in rows.enumerate() {
         let x = all.us.width(k);
-        for (l, &[u, v, middle]) in row.iter().enumerate() {
+        for (l, off) in row.iter().enumerate() {
+            let [u, v, middle] = off.map(|d| d / good);
             let y = all.vs.width(l);
             // What is off in the middle of the diagonal is the sum of both and of the twist.
             let bend = Bend::new(u / (x * x), v / (y * y), (middle - u - v) / (2.0 * x * y));

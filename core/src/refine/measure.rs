@@ -10,13 +10,16 @@
 //! peak halfway between two of the four of a side is a sixteenth higher at most than what they show.
 //! There are at least four to a cell's side and, up to [`MOST`] of them, two to a polynomial piece.
 
-use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
+use fearless_simd::{Simd, f64x4, prelude::*};
 use rayon::prelude::*;
 
 use super::balance::Grid;
 use super::near::{Closeness, look};
-use crate::evaluate::{Coordinates, Isoline, Isolines, Net};
+use crate::evaluate::{Isoline, Isolines, Net};
+use crate::fours::{FOUR, Four, cross4, dot4, four_points, sub4};
+use crate::simd::{Token, with_simd};
 use crate::surface::Direction;
 use crate::vector::{Point, add_scaled, cross, dot, length, sub};
 
@@ -24,7 +27,7 @@ use crate::vector::{Point, add_scaled, cross, dot, length, sub};
 const LEAST: usize = 4;
 const MOST: usize = 32;
 
-/// Rows of cells that share a running maximum, whatever the number of threads.
+/// Rows of cells that one thread takes at a time.
 const CHUNK: usize = 16;
 
 /// A cell that exceeds the tolerance.
@@ -74,35 +77,32 @@ pub(super) fn measure(
     }
     let (inside, corners) = places(grid, density[1], columns);
     let (inside, corners) = (Isolines::new(net, &inside), Isolines::new(net, &corners));
+    let within = Running::default();
     let chunks = rows.par_chunks(CHUNK).map(|rows| {
         let mut strip = Strip::new(columns);
-        let mut measured = Measured::default();
+        let mut exceeding = Vec::new();
         for (k, &row) in rows.iter().enumerate() {
             let follows = k > 0 && rows[k - 1] + 1 == row;
             strip.place::<true>(&corners, grid, row, follows);
             strip.bound(&inside, grid, density, row);
             // The likely worst first: it spares the others a look.
-            let most = strip.bounds.iter().fold(0.0, |a: f64, &b| greater(b, a));
-            let worst = strip.bounds.iter().position(|&b| b == most).unwrap_or(0);
+            let bounds = &strip.bounds.as_flattened()[..columns.len()];
+            let most = bounds.iter().fold(0.0, |a: f64, &b| a.max(b));
+            let worst = bounds.iter().position(|&b| b == most).unwrap_or(0);
             let first = std::iter::once(worst);
             for j in first.chain((0..columns.len()).filter(|&j| j != worst)) {
                 let column = columns[j];
                 // The far edges of the surface belong to the last cells, which have no next ones.
                 let last = row + 2 == grid.us.len() || column + 2 == grid.vs.len();
-                if strip.bounds[j] <= measured.within * measured.within && !last {
+                let known = within.get();
+                if bounds[j] <= known * known && !last {
                     continue;
                 }
-                let closeness = look(
-                    net,
-                    grid,
-                    density,
-                    [row, column],
-                    [measured.within, tolerance],
-                );
+                let closeness = look(net, grid, density, [row, column], [known, tolerance]);
                 if closeness.deviation <= tolerance {
-                    measured.within = measured.within.max(closeness.deviation);
+                    within.raise(closeness.deviation);
                 } else {
-                    measured.exceeding.push(Exceeding {
+                    exceeding.push(Exceeding {
                         row,
                         column,
                         closeness,
@@ -110,27 +110,41 @@ pub(super) fn measure(
                 }
             }
         }
-        measured
+        exceeding
     });
-    let chunks: Vec<Measured> = chunks.collect();
-    let mut all = Measured::default();
-    for chunk in chunks {
-        all.within = all.within.max(chunk.within);
-        all.exceeding.extend(chunk.exceeding);
+    let exceeding: Vec<Vec<Exceeding>> = chunks.collect();
+    Measured {
+        within: within.get(),
+        exceeding: exceeding.into_iter().flatten().collect(),
     }
-    all
+}
+
+/// The largest deviation so far, from all threads: what they spare each other does not change the largest in
+/// the end.
+#[derive(Default)]
+struct Running(AtomicU64);
+
+impl Running {
+    fn get(&self) -> f64 {
+        f64::from_bits(self.0.load(Ordering::Relaxed))
+    }
+
+    /// Numbers that are not negative are in the order of their bits.
+    fn raise(&self, deviation: f64) {
+        self.0.fetch_max(deviation.to_bits(), Ordering::Relaxed);
+    }
 }
 
 /// How far the middles of the sides along u, of those along v, and of the cells are from the planes of
 /// their facets, mm, signed: three samples that tell nearly all, for a fifth of the work. By rows and
-/// columns.
-pub(super) fn probe(net: &Net, grid: &Grid) -> Vec<[f64; 3]> {
+/// columns, some rows together.
+pub(super) fn probe(net: &Net, grid: &Grid) -> Vec<Vec<[f64; 3]>> {
     let columns: Vec<usize> = (0..grid.vs.len() - 1).collect();
     let rows: Vec<usize> = (0..grid.us.len() - 1).collect();
     let n = columns.len();
     let (inside, corners) = places(grid, 2, &columns);
     let (inside, corners) = (Isolines::new(net, &inside), Isolines::new(net, &corners));
-    let chunks = rows.par_chunks(CHUNK).flat_map_iter(|rows| {
+    let chunks = rows.par_chunks(CHUNK).map(|rows| {
         let mut strip = Strip::new(&columns);
         let mut found = vec![[0.0; 3]; rows.len() * n];
         for (&row, found) in rows.iter().zip(found.chunks_exact_mut(n)) {
@@ -139,10 +153,10 @@ pub(super) fn probe(net: &Net, grid: &Grid) -> Vec<[f64; 3]> {
             for (a, b, k) in [(0, 1, 1), (1, 0, 0), (1, 1, 2)] {
                 if b != 1 || k != 2 {
                     inside.at(part(&grid.us, row, a, 2), &mut strip.samples);
-                    strip.dealt.deal(&strip.samples.points, 2);
                 }
                 let facets = &strip.facets[usize::from(a <= b)];
-                facets.off(found, k, &strip.dealt, b * n..(b + 1) * n);
+                let samples = strip.samples.within(b * n..(b + 1) * n);
+                with_simd!(Token::best(), simd => facets.off(simd, found, k, samples));
             }
         }
         found
@@ -155,13 +169,12 @@ fn beside(columns: &[usize]) -> bool {
     columns.windows(2).all(|w| w[0] + 1 == w[1])
 }
 
-/// The parameters in v of the samples, and of the corners of the cells: all near ones, then all
+/// The parameters in v of the samples, all first ones of the cells, then all second ones …: what is computed
+/// alike lies side by side; and of the corners of the cells: all near ones, then all
 /// far ones, or those of columns that follow each other only once.
 fn places(grid: &Grid, across: usize, columns: &[usize]) -> (Vec<f64>, Vec<f64>) {
     let at = |j, b| part(&grid.vs, j, b, across);
-    let inside = columns
-        .iter()
-        .flat_map(|&j| (0..across).map(move |b| at(j, b)));
+    let inside = (0..across).flat_map(|b| columns.iter().map(move |&j| at(j, b)));
     let corners = if beside(columns) {
         grid.vs[columns[0]..columns[0] + columns.len() + 1].to_vec()
     } else {
@@ -182,16 +195,14 @@ pub(super) fn part(lines: &[f64], i: usize, part: usize, parts: usize) -> f64 {
 
 /// One row of cells, and room for its samples.
 struct Strip {
-    bounds: Vec<f64>,
+    cells: usize,
+    bounds: Vec<[f64; FOUR]>,
     /// From a cell's near corner to its far one.
     to_far: usize,
     facets: [Planes; 2],
     near: Isoline,
     far: Isoline,
     samples: Isoline,
-    /// The same, all first ones of the cells, then all second ones …: what is computed alike lies side
-    /// by side.
-    dealt: Coordinates,
 }
 
 /// Numbers of a facet: the normal and the gradients of two of the barycentric coordinates, each with
@@ -199,35 +210,39 @@ struct Strip {
 /// that the corner's coordinate is negative.
 const NUMBERS: usize = 15;
 
-/// The facets of one kind along a row of cells, a number at a time.
-struct Planes([Vec<f64>; NUMBERS]);
+/// The facets of one kind along a row of cells, four together and of these a number at a time.
+struct Planes(Vec<Numbers>);
+
+type Numbers = [[f64; FOUR]; NUMBERS];
 
 impl Strip {
     fn new(columns: &[usize]) -> Self {
         let cells = columns.len();
-        let planes = || Planes(std::array::from_fn(|_| vec![0.0; cells]));
+        let fours = cells.div_ceil(FOUR);
+        let planes = || Planes(vec![[[0.0; FOUR]; NUMBERS]; fours]);
         Self {
-            bounds: vec![0.0; cells],
+            cells,
+            bounds: vec![[0.0; FOUR]; fours],
             to_far: if beside(columns) { 1 } else { cells },
             facets: [planes(), planes()],
             near: Isoline::default(),
             far: Isoline::default(),
             samples: Isoline::default(),
-            dealt: Coordinates::default(),
         }
     }
 
     /// Bounds of the squares of the cells' deviations.
     fn bound(&mut self, inside: &Isolines, grid: &Grid, density: [usize; 2], row: usize) {
-        let n = self.bounds.len();
+        let n = self.cells;
         let [along, across] = density;
         for a in 0..along {
             inside.at(part(&grid.us, row, a, along), &mut self.samples);
-            self.dealt.deal(&self.samples.points, across);
             // The first sample of all is the facets' common corner.
             for b in usize::from(a == 0)..across {
                 let side = usize::from(a * across <= b * along);
-                self.facets[side].raise(&mut self.bounds, &self.dealt, b * n..(b + 1) * n);
+                let facets = &self.facets[side];
+                let samples = self.samples.within(b * n..(b + 1) * n);
+                with_simd!(Token::best(), simd => facets.raise(simd, &mut self.bounds, samples));
             }
         }
     }
@@ -247,116 +262,113 @@ impl Strip {
         }
         corners.at(grid.us[row + 1], &mut self.far);
         let far_side = self.to_far;
-        self.bounds.fill(0.0);
+        self.bounds.fill([0.0; FOUR]);
         // As in `row::facets`: the diagonal runs from the first corner to the last.
-        let (near, far) = (&self.near.points, &self.far.points);
-        let corners = [(near, 0), (far, 0), (far, far_side)];
-        self.facets[0].set::<SIDEWAYS>(&mut self.bounds, corners);
-        let corners = [(near, 0), (far, far_side), (near, far_side)];
-        self.facets[1].set::<SIDEWAYS>(&mut self.bounds, corners);
+        let n = self.cells;
+        let (near, far) = (&self.near, &self.far);
+        let [a, d] = [0, far_side].map(|from| near.within(from..from + n));
+        let [b, c] = [0, far_side].map(|from| far.within(from..from + n));
+        for (facets, corners) in self.facets.iter_mut().zip([[a, b, c], [a, c, d]]) {
+            let bounds = &mut self.bounds[..];
+            with_simd!(Token::best(), simd => facets.set::<_, SIDEWAYS>(simd, bounds, corners));
+        }
     }
 }
 
 impl Planes {
-    /// Prepares the facets between three corners of every cell, each given by where the first cell's
-    /// lies among some points. The bounds of those without a plane are raised beyond all others.
-    fn set<const SIDEWAYS: bool>(
+    /// Prepares the facets between three corners of every cell. The bounds of those without a plane are
+    /// raised beyond all others.
+    #[inline(always)]
+    fn set<S: Simd, const SIDEWAYS: bool>(
         &mut self,
-        bounds: &mut [f64],
-        corners: [(&Coordinates, usize); 3],
+        simd: S,
+        bounds: &mut [[f64; FOUR]],
+        corners: [[&[f64]; 3]; 3],
     ) {
-        let n = bounds.len();
-        let f = self.0.each_mut().map(|numbers| &mut numbers[..n]);
-        let [a, b, c] = corners.map(|(points, from)| {
-            let to = from + n;
-            [
-                &points.x[from..to],
-                &points.y[from..to],
-                &points.z[from..to],
-            ]
-            .map(|c| &c[..n])
-        });
-        for j in 0..n {
-            let (a, b, c) = (
-                [a[0][j], a[1][j], a[2][j]],
-                [b[0][j], b[1][j], b[2][j]],
-                [c[0][j], c[1][j], c[2][j]],
-            );
-            let (ab, ac) = (sub(b, a), sub(c, a));
-            let normal = cross(ab, ac);
-            let square = dot(normal, normal);
-            if square <= 0.0 {
-                bounds[j] = f64::INFINITY;
+        let one = f64x4::splat(simd, 1.0);
+        let beyond = f64x4::splat(simd, f64::INFINITY);
+        let mut j = 0;
+        for (f, bound) in self.0.iter_mut().zip(bounds) {
+            let a = four_points(simd, corners[0], j);
+            let b = four_points(simd, corners[1], j);
+            let c = four_points(simd, corners[2], j);
+            let (ab, ac) = (sub4(b, a), sub4(c, a));
+            let normal = cross4(ab, ac);
+            let square = dot4(normal, normal);
+            let flat = square.simd_le(0.0);
+            *bound = *flat.select(beyond, f64x4::from_slice(simd, bound));
+            let square = square.simd_gt(0.0).select(square, one);
+            set_form(f, 0, normal, one / square.sqrt(), a);
+            if SIDEWAYS {
+                let scale = one / square;
+                set_form(f, 4, cross4(ac, normal), scale, a);
+                set_form(f, 8, cross4(normal, ab), scale, a);
+                // Where the other two coordinates can make up for one that is negative, a sample comes to
+                // the facet along either edge from that corner; the shorter one bounds its distance.
+                let bc = sub4(c, b);
+                let (ab, ac, bc) = (dot4(ab, ab), dot4(ac, ac), dot4(bc, bc));
+                f[12] = *ab.min(bc).sqrt();
+                f[13] = *ac.min(bc).sqrt();
+                f[14] = *ab.min(ac).sqrt();
             }
-            let square = if square > 0.0 { square } else { 1.0 };
-            let mut form = |k: usize, v: Point, scale: f64| {
-                let v = [v[0] * scale, v[1] * scale, v[2] * scale];
-                (f[k][j], f[k + 1][j], f[k + 2][j]) = (v[0], v[1], v[2]);
-                f[k + 3][j] = -dot(v, a);
-            };
-            form(0, normal, 1.0 / square.sqrt());
-            if !SIDEWAYS {
-                continue;
-            }
-            let scale = 1.0 / square;
-            form(4, cross(ac, normal), scale);
-            form(8, cross(normal, ab), scale);
-            // Where the other two coordinates can make up for one that is negative, a sample comes to
-            // the facet along either edge from that corner; the shorter one bounds its distance.
-            let bc = sub(c, b);
-            let (ab, ac, bc) = (dot(ab, ab), dot(ac, ac), dot(bc, bc));
-            let less = |a: f64, b: f64| if a < b { a } else { b };
-            f[12][j] = less(ab, bc).sqrt();
-            f[13][j] = less(ac, bc).sqrt();
-            f[14][j] = less(ab, ac).sqrt();
+            j += FOUR;
         }
     }
 
     /// The signed distances of a sample of each cell from the plane of its facet.
-    fn off(&self, found: &mut [[f64; 3]], k: usize, samples: &Coordinates, within: Range<usize>) {
-        let n = found.len();
-        let [a, b, c, d]: [&[f64]; 4] = std::array::from_fn(|k| &self.0[k][..n]);
-        let [x, y, z] =
-            [&samples.x, &samples.y, &samples.z].map(|c| &c[within.start..within.end][..n]);
-        for (j, found) in found.iter_mut().enumerate() {
-            found[k] = a[j] * x[j] + b[j] * y[j] + c[j] * z[j] + d[j];
+    #[inline(always)]
+    fn off<S: Simd>(&self, simd: S, found: &mut [[f64; 3]], k: usize, samples: [&[f64]; 3]) {
+        let mut j = 0;
+        for (f, found) in self.0.iter().zip(found.chunks_mut(FOUR)) {
+            let off = form(simd, f, 0, four_points(simd, samples, j));
+            for (found, off) in found.iter_mut().zip(*off) {
+                found[k] = off;
+            }
+            j += FOUR;
         }
     }
 
     /// Raises the bounds to the squares of what a sample of each cell deviates at most.
-    fn raise(&self, bounds: &mut [f64], samples: &Coordinates, within: Range<usize>) {
-        let n = bounds.len();
-        let f: [&[f64]; NUMBERS] = std::array::from_fn(|k| &self.0[k][..n]);
-        let (x, y, z) = (
-            &samples.x[within.clone()][..n],
-            &samples.y[within.clone()][..n],
-            &samples.z[within][..n],
-        );
-        for j in 0..n {
-            let along =
-                |k: usize| f[k][j] * x[j] + f[k + 1][j] * y[j] + f[k + 2][j] * z[j] + f[k + 3][j];
-            let (off, s, t) = (along(0), along(4), along(8));
-            let r = 1.0 - s - t;
-            let sideways = greater(
-                greater(-s * f[12][j], -t * f[13][j]),
-                greater(-r * f[14][j], 0.0),
-            );
+    #[inline(always)]
+    fn raise<S: Simd>(&self, simd: S, bounds: &mut [[f64; FOUR]], samples: [&[f64]; 3]) {
+        let (none, one) = (f64x4::splat(simd, 0.0), f64x4::splat(simd, 1.0));
+        let without = f64x4::splat(simd, f64::INFINITY);
+        let mut j = 0;
+        for (f, bound) in self.0.iter().zip(bounds) {
+            let p = four_points(simd, samples, j);
+            let off = form(simd, f, 0, p);
+            let (s, t) = (form(simd, f, 4, p), form(simd, f, 8, p));
+            let r = one - s - t;
+            let by_s = -s * f64x4::from_slice(simd, &f[12]);
+            let by_t = -t * f64x4::from_slice(simd, &f[13]);
+            let by_r = -r * f64x4::from_slice(simd, &f[14]);
+            let sideways = by_s.max(by_t).max(by_r.max(none));
             // With one coordinate above 1, the other two do not make up for each other.
-            let beyond = if greater(greater(s, t), r) > 1.0 {
-                f64::INFINITY
-            } else {
-                0.0
-            };
+            let beyond = s.max(t).max(r).simd_gt(one).select(without, none);
             let out = sideways + beyond;
-            bounds[j] = greater(bounds[j], off * off + out * out);
+            *bound = *f64x4::from_slice(simd, bound).max(off * off + out * out);
+            j += FOUR;
         }
     }
 }
 
-/// The greater of two numbers, in one instruction: neither is NaN.
+/// Sets linear functions of points that grow along `v` and vanish at `a`: four numbers from the `k`-th on.
 #[inline(always)]
-fn greater(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
+fn set_form<S: Simd>(f: &mut Numbers, k: usize, v: Four<S>, scale: f64x4<S>, a: Four<S>) {
+    let v = [v[0] * scale, v[1] * scale, v[2] * scale];
+    (f[k], f[k + 1], f[k + 2]) = (*v[0], *v[1], *v[2]);
+    f[k + 3] = *-dot4(v, a);
+}
+
+/// Those functions of points.
+#[inline(always)]
+fn form<S: Simd>(simd: S, f: &Numbers, k: usize, p: Four<S>) -> f64x4<S> {
+    let along = [
+        f64x4::from_slice(simd, &f[k]),
+        f64x4::from_slice(simd, &f[k + 1]),
+        f64x4::from_slice(simd, &f[k + 2]),
+    ];
+    dot4(along, p) + f64x4::from_slice(simd, &f[k + 3])
 }
 
 /// Distance from `p` to the triangle, and whether it lies over it.
