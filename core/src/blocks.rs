@@ -146,9 +146,9 @@ pub(crate) fn longest_side(points: impl Iterator<Item = Point>) -> usize {
     (0..3).fold(0, |a, b| if extents[b] > extents[a] { b } else { a })
 }
 
-/// Leaves the vertices of a block of points to `take`.
-pub(crate) fn point_vertices(rows: &[Row], block: &Block, take: &mut dyn FnMut(Point)) {
-    each_point(rows, block, |row, i| take(row.points[i]));
+/// Leaves the vertices of a block of points to `take`, some at a time.
+pub(crate) fn point_vertices(rows: &[Row], block: &Block, take: &mut dyn FnMut(&[Point])) {
+    each_point(rows, block, |row, i| take(&row.points[i..=i]));
 }
 
 /// The leaf of a block of points.
@@ -178,8 +178,8 @@ fn each_point(rows: &[Row], block: &Block, mut each: impl FnMut(&Row, usize)) {
     }
 }
 
-/// Leaves the vertices of a block of facets to `take`, each once.
-pub(crate) fn facet_vertices(rows: &[Row], block: &Block, take: &mut dyn FnMut(Point)) {
+/// Leaves the vertices of a block of facets to `take`, each once, some at a time.
+pub(crate) fn facet_vertices(rows: &[Row], block: &Block, take: &mut dyn FnMut(&[Point])) {
     match &block.what {
         What::Tile {
             rows: some,
@@ -187,10 +187,7 @@ pub(crate) fn facet_vertices(rows: &[Row], block: &Block, take: &mut dyn FnMut(P
         } => {
             let columns = columns.start as usize..=columns.end as usize;
             for row in &rows[some.start as usize..=some.end as usize] {
-                row.points[columns.clone()]
-                    .iter()
-                    .copied()
-                    .for_each(&mut *take);
+                take(&row.points[columns.clone()]);
             }
         }
         What::Scattered { row, numbers } => {
@@ -202,8 +199,10 @@ pub(crate) fn facet_vertices(rows: &[Row], block: &Block, take: &mut dyn FnMut(P
                 corners.copy_from_slice(&facets[n as usize]);
             }
             corners.sort_unstable();
-            let distinct = corners.chunk_by(|a, b| a == b);
-            distinct.for_each(|c| take(row.points[c[0] as usize]));
+            for distinct in corners.chunk_by(|a, b| a == b) {
+                let vertex = distinct[0] as usize;
+                take(&row.points[vertex..=vertex]);
+            }
         }
     }
 }

@@ -51,7 +51,7 @@ impl<L: Leaf> Tree<L> {
         points: Vec<Point>,
         mut blocks: Vec<Block>,
         fill: impl Fn(&[Point], &Block) -> L + Sync + Send,
-        vertices: impl Fn(&Block, &mut dyn FnMut(Point)) + Sync + Send,
+        vertices: impl Fn(&Block, &mut dyn FnMut(&[Point])) + Sync + Send,
     ) -> Self {
         arrange(&mut blocks);
         let leaves = blocks.par_iter().with_min_len(ALONE);

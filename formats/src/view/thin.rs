@@ -39,7 +39,7 @@ pub struct Seen {
 
 /// The positions of a path that are shown.
 pub(super) fn shown(path: &[Waypoint]) -> Shown {
-    thinned(&seen(path), MOST)
+    thinned(seen(path), MOST)
 }
 
 fn seen(all: &[Waypoint]) -> Vec<Seen> {
@@ -66,15 +66,18 @@ fn seen(all: &[Waypoint]) -> Vec<Seen> {
     seen.collect()
 }
 
-fn thinned(all: &[Seen], most: usize) -> Shown {
-    let every = match all.len() {
-        n if n <= most => 1,
-        n => (KEPT * n).div_ceil(most),
+fn thinned(all: Vec<Seen>, most: usize) -> Shown {
+    let of = all.len();
+    let every = (KEPT * of).div_ceil(most);
+    let (positions, every) = if of <= most {
+        (all, 1)
+    } else {
+        let runs = all.chunks(every);
+        (runs.flat_map(outstanding).collect(), every)
     };
-    let runs = all.chunks(every);
     Shown {
-        positions: runs.flat_map(outstanding).collect(),
-        of: all.len() as u64,
+        positions,
+        of: of as u64,
         every: every as u64,
     }
 }
@@ -138,7 +141,7 @@ mod tests {
     #[test]
     fn a_short_path_is_shown_whole() {
         let all = seen(&path(&[Some(1.0); 100]));
-        let shown = thinned(&all, 100);
+        let shown = thinned(all.clone(), 100);
         assert_eq!((shown.every, shown.of), (1, 100));
         assert_eq!(shown.positions, all);
     }
@@ -151,7 +154,7 @@ mod tests {
         heights[2345] = Some(99.0);
         heights[777] = None;
         let all = seen(&path(&heights));
-        let shown = thinned(&all, 600);
+        let shown = thinned(all.clone(), 600);
         assert_eq!((shown.every, shown.of), (30, 3000));
         assert!(shown.positions.len() <= 600);
         assert!(shown.positions.is_sorted_by(|a, b| a.index < b.index));

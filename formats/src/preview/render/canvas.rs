@@ -14,9 +14,15 @@ const SUNK: f64 = 0.35;
 /// the corner is lit as the facet is.
 const CREASE: f64 = 0.85;
 /// Levels of brightness from nothing to the part's own colour; what shines is brighter.
-const LEVELS: f32 = 215.0;
+const LEVELS: f64 = 215.0;
 /// A triangle of a smaller area, in samples, covers none.
 const TINY: f64 = 1.0e-6;
+
+/// Greatest depth, counted from the farthest point, of which the depth is 1.
+const DEPTHS: u32 = (1 << 23) - 1;
+/// Parts of a depth, and of a level, that are counted across a triangle.
+const FINER_DEPTH: f64 = 256.0;
+const FINER_LEVEL: f64 = 65536.0;
 
 /// The samples of the rectangle of whole pixels that the part covers.
 pub(super) struct Canvas {
@@ -24,10 +30,13 @@ pub(super) struct Canvas {
     origin: [usize; 2],
     /// Samples.
     size: [usize; 2],
-    /// Towards the viewer, mm.
-    depth: Vec<f32>,
-    /// Brightness in parts of [`LEVELS`].
-    light: Vec<u8>,
+    /// Towards the viewer, mm: the farthest point.
+    far: f64,
+    /// Depths to the millimetre.
+    scale: f64,
+    /// The depth that is seen and, in eight bits below it, the brightness there, in parts of [`LEVELS`]: of two
+    /// such numbers the greater one is in front. Zero where there is nothing.
+    samples: Vec<i32>,
 }
 
 /// Column, row, depth and light of a triangle's corner.
@@ -54,8 +63,8 @@ impl Canvas {
                         Some(&normal) if dot(normal, flat) > CREASE => smooth[k],
                         _ => light(flat),
                     };
-                    let [x, y, depth] = seen[k];
-                    [x, y, depth, light]
+                    let [x, y, near] = seen[k];
+                    [x, y, canvas.depth(near), LEVELS * light + 0.5]
                 };
                 canvas.fill(corners.map(corner));
             }
@@ -74,12 +83,22 @@ impl Canvas {
         };
         let (columns, rows) = (pixels(0, SIZE.0), pixels(1, SIZE.1));
         let size = [columns, rows].map(|(first, end)| (end - first) * SAMPLES);
+        let near = points.iter().flatten().map(|p| p[2]);
+        let near = Interval::of(near.filter(|c| c.is_finite()));
+        // Of what is flat towards the viewer all depths are 1.
+        let scale = f64::from(DEPTHS - 1) / (near.high - near.low).max(f64::MIN_POSITIVE);
         Self {
             origin: [columns.0, rows.0],
             size,
-            depth: vec![f32::NEG_INFINITY; size[0] * size[1]],
-            light: vec![0; size[0] * size[1]],
+            far: near.low,
+            scale: if scale.is_finite() { scale } else { 0.0 },
+            samples: vec![0; size[0] * size[1]],
         }
+    }
+
+    /// The depth of what is so near to the viewer, mm.
+    fn depth(&self, near: f64) -> f64 {
+        1.0 + (near - self.far) * self.scale
     }
 
     fn fill(&mut self, corners: [Corner; 3]) {
@@ -95,15 +114,8 @@ impl Canvas {
             (low + 0.5) as usize..((high + 0.5) as usize).min(count)
         };
         let Interval { low, high } = Interval::of([a[1], b[1], c[1]]);
-        // How the depth, or the light, grows across and down its plane.
-        let growth = |k: usize| {
-            let (p, q) = (b[k] - a[k], c[k] - a[k]);
-            [
-                (p * (c[1] - a[1]) - q * (b[1] - a[1])) / area,
-                (q * (b[0] - a[0]) - p * (c[0] - a[0])) / area,
-            ]
-        };
-        let (deeper, lighter) = (growth(2), growth(3));
+        let depth = Plane::new([a, b, c], 2, area, FINER_DEPTH);
+        let light = Plane::new([a, b, c], 3, area, FINER_LEVEL);
         let edges = [[a, b], [b, c], [c, a]].map(|[p, q]| {
             let slope = (q[0] - p[0]) / (q[1] - p[1]);
             (p, q, slope)
@@ -122,20 +134,17 @@ impl Canvas {
             if columns.is_empty() {
                 continue;
             }
-            let (across, down) = (columns.start as f64 + 0.5 - a[0], y - a[1]);
-            let first = |k: usize, [x, y]: [f64; 2]| (a[k] + across * x + down * y) as f32;
-            let (near, bright) = (first(2, deeper), first(3, lighter));
-            let (deeper, lighter) = (deeper[0] as f32, lighter[0] as f32);
+            let ends = [columns.start as f64 + 0.5, columns.end as f64 - 0.5];
+            let between = columns.len() - 1;
+            let (mut depth, deeper) = depth.steps(ends.map(|x| [x, y]), between);
+            let (mut level, lighter) = light.steps(ends.map(|x| [x, y]), between);
             let start = row * self.size[0];
-            let columns = start + columns.start..start + columns.end;
-            let samples = self.depth[columns.clone()].iter_mut();
-            for (i, (d, l)) in samples.zip(&mut self.light[columns]).enumerate() {
-                let i = i as f32;
-                let here = near + i * deeper;
-                if here > *d {
-                    *d = here;
-                    *l = (LEVELS * (bright + i * lighter) + 0.5) as u8;
-                }
+            for sample in &mut self.samples[start + columns.start..start + columns.end] {
+                // The level goes where the parts of the depth are.
+                let here = depth & !0xff | level >> 16;
+                *sample = if here > *sample { here } else { *sample };
+                depth = depth.wrapping_add(deeper);
+                level = level.wrapping_add(lighter);
             }
         }
     }
@@ -152,11 +161,11 @@ impl Canvas {
                 let mut sum = [0.0; 3];
                 let mut bare = 0;
                 for k in 0..SAMPLES * SAMPLES {
-                    let sample = first + k / SAMPLES * wide + k % SAMPLES;
-                    if self.depth[sample] == f32::NEG_INFINITY {
+                    let sample = self.samples[first + k / SAMPLES * wide + k % SAMPLES];
+                    if sample == 0 {
                         bare += 1;
                     } else {
-                        let light = f32::from(self.light[sample]) / LEVELS;
+                        let light = f32::from(sample as u8) / LEVELS as f32;
                         sum = std::array::from_fn(|k| sum[k] + (BEECH[k] * light).min(255.0));
                     }
                 }
@@ -176,7 +185,45 @@ impl Canvas {
             (c >= 0.0 && c < self.size[k] as f64).then_some(c as usize)
         };
         let sample = place(1).zip(place(0));
-        sample.is_some_and(|(y, x)| f64::from(self.depth[y * self.size[0] + x]) > p[2] + SUNK)
+        let seen = sample.map_or(0, |(y, x)| self.samples[y * self.size[0] + x] >> 8);
+        seen > 0 && f64::from(seen) > self.depth(p[2] + SUNK)
+    }
+}
+
+/// How a number at the corners of a triangle grows across it.
+struct Plane {
+    corner: Corner,
+    at_corner: f64,
+    /// To the right and down.
+    growth: [f64; 2],
+    /// No sample lies beyond the corners.
+    within: Interval,
+}
+
+impl Plane {
+    /// That of the `k`-th number, counted in `parts`.
+    fn new([a, b, c]: [Corner; 3], k: usize, area: f64, parts: f64) -> Self {
+        let values = [a[k], b[k], c[k]].map(|value| value * parts);
+        let (p, q) = (values[1] - values[0], values[2] - values[0]);
+        Self {
+            corner: a,
+            at_corner: values[0],
+            growth: [
+                (p * (c[1] - a[1]) - q * (b[1] - a[1])) / area,
+                (q * (b[0] - a[0]) - p * (c[0] - a[0])) / area,
+            ],
+            within: Interval::of(values),
+        }
+    }
+
+    /// The number at the first of two places, and what it grows by to each of the next ones up to the second.
+    fn steps(&self, ends: [[f64; 2]; 2], between: usize) -> (i32, i32) {
+        let [first, last] = ends.map(|[x, y]| {
+            let (across, down) = (x - self.corner[0], y - self.corner[1]);
+            let at = self.at_corner + across * self.growth[0] + down * self.growth[1];
+            at.max(self.within.low).min(self.within.high) as i32
+        });
+        (first, (last - first) / (between as i32).max(1))
     }
 }
 
