@@ -12,8 +12,8 @@ use std::ops::Range;
 
 use fearless_simd::{Simd, f64x4, prelude::*};
 
-use crate::fours::FOUR;
 use crate::simd::{Token, with_simd};
+use crate::slices::{Axes, FOUR};
 use crate::surface::{Basis, Surface};
 use crate::vector::Point;
 
@@ -23,15 +23,23 @@ pub struct Net<'a> {
     pub surface: &'a Surface,
     /// Its poles with a 1 each, for what weighs them.
     poles: Vec<[f64; FOUR]>,
+    /// What it is evaluated by.
+    pub(crate) simd: Token,
 }
 
 impl<'a> Net<'a> {
     /// Copies the poles, which is worth it once for several grids.
     pub fn new(surface: &'a Surface) -> Self {
+        Self::by(Token::best(), surface)
+    }
+
+    /// The same, to be evaluated by a level that is told.
+    pub(crate) fn by(simd: Token, surface: &'a Surface) -> Self {
         let poles = surface.poles().iter().map(|&[x, y, z]| [x, y, z, 1.0]);
         Self {
             surface,
             poles: poles.collect(),
+            simd,
         }
     }
 
@@ -83,7 +91,7 @@ impl Isoline {
     }
 
     /// The points of a range, a coordinate at a time.
-    pub fn within(&self, range: Range<usize>) -> [&[f64]; 3] {
+    pub fn within(&self, range: Range<usize>) -> Axes<'_> {
         [0, 1, 2].map(|k| &self.at[k][range.clone()])
     }
 }
@@ -128,7 +136,7 @@ impl<'a> Isolines<'a> {
         for c in &mut line.at {
             c.resize(self.columns + FOUR - 1, 1.0);
         }
-        with_simd!(Token::best(), simd => self.fill(simd, &basis, line));
+        with_simd!(self.net.simd, simd => self.fill(simd, &basis, line));
     }
 
     #[inline(always)]
@@ -150,7 +158,7 @@ impl<'a> Isolines<'a> {
     /// The isocurve's poles.
     #[inline(always)]
     fn collapse<S: Simd>(&self, simd: S, basis: &Basis, curve: &mut Vec<[f64; FOUR]>) {
-        let Net { surface, poles } = self.net;
+        let Net { surface, poles, .. } = self.net;
         let (n, degree) = (surface.v().count(), surface.u().degree);
         curve.clear();
         for j in self.poles.clone() {

@@ -71,6 +71,9 @@ mod error;
 mod tolerance;
 mod vector;
 
+mod simd;
+mod slices;
+
 mod evaluate;
 mod jet;
 mod surface;
@@ -92,9 +95,6 @@ mod bisect;
 mod extent;
 mod plan;
 mod runs;
-
-mod fours;
-mod simd;
 
 mod contact;
 mod lanes;

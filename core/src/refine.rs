@@ -47,11 +47,15 @@ const TRIAL_POINTS: f64 = (1 << 18) as f64;
 
 /// Finds the lines of a grid whose facets are within `tolerance` (mm) of the surface at every sample.
 pub(crate) fn refine(name: &str, surface: &Surface, tolerance: f64) -> Result<Lines> {
+    refine_net(name, &Net::new(surface), tolerance)
+}
+
+fn refine_net(name: &str, net: &Net, tolerance: f64) -> Result<Lines> {
+    let (surface, simd) = (net.surface, net.simd);
     let asked = tolerance;
     let tolerance = SEEN * asked;
-    let net = Net::new(surface);
     let bends = bends(surface, tolerance);
-    let densities = balance(&bends);
+    let densities = balance(simd, &bends);
     let not_reached = |grid: &Grid, measured: &Measured| Error::ToleranceNotReached {
         name: name.to_owned(),
         rows: grid.us.len(),
@@ -63,16 +67,16 @@ pub(crate) fn refine(name: &str, surface: &Surface, tolerance: f64) -> Result<Li
     if !fits(m, n) {
         let fewer = (TRIAL_POINTS / (m * n)).sqrt();
         let grid = lay(surface, &bends, &densities.scaled(fewer));
-        let measured = measure_all(&net, &grid, tolerance);
+        let measured = measure_all(net, &grid, tolerance);
         return Err(not_reached(&grid, &measured));
     }
     let mut grid = lay(surface, &bends, &densities);
     for _ in 0..ADJUSTMENTS {
-        let found = probe(&net, &grid);
+        let found = probe(net, &grid);
         let cells = bends_found(&bends, [&grid.us, &grid.vs], &found, GOAL * tolerance);
-        grid = lay(surface, &cells, &adjust(&cells));
+        grid = lay(surface, &cells, &adjust(simd, &cells));
     }
-    let mut measured = measure_all(&net, &grid, tolerance);
+    let mut measured = measure_all(net, &grid, tolerance);
     for _ in 0..ROUNDS {
         if measured.exceeding.is_empty() {
             return Ok(Lines {
@@ -86,7 +90,7 @@ pub(crate) fn refine(name: &str, surface: &Surface, tolerance: f64) -> Result<Li
             break;
         }
         // What was measured in cells that are no more stays in the maximum, above what is now there.
-        let again = measure_changed(&net, &grid, tolerance, changed);
+        let again = measure_changed(net, &grid, tolerance, changed);
         measured = Measured {
             within: measured.within.max(again.within),
             ..again

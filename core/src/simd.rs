@@ -1,4 +1,4 @@
-//! Instruction sets: which vectors the searches compute with.
+//! Instruction sets: which vectors the searches compute with, and surfaces and hierarchies are made by.
 //!
 //! Every level computes the same values by the same sequence of + − × ÷ √, lane by lane, so the choice
 //! changes the time that a path takes and not one bit of it. The levels come from a crate; this module

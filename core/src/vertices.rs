@@ -2,12 +2,11 @@
 
 use std::ops::Range;
 
-use fearless_simd::{Simd, f64x8, prelude::*};
 use rayon::prelude::*;
 
 use crate::blocks::Block;
 use crate::bound::Frame;
-use crate::lanes::LANES;
+use crate::slices::Axes;
 use crate::vector::{Interval, Point};
 
 /// Leaves of which the vertices are gathered together.
@@ -23,9 +22,6 @@ struct Lot {
     /// Where those of each leaf begin, and where the last end.
     starts: Vec<usize>,
 }
-
-/// Points, a coordinate at a time.
-pub(crate) type Axes<'a> = [&'a [f64]; 3];
 
 impl Vertices {
     /// Those that `vertices` leaves to its last argument for each leaf's block, gathered in parallel on the
@@ -72,33 +68,4 @@ impl Vertices {
         let square = across.map(|(y, z)| y * y + z * z).fold(0.0, f64::max);
         Frame::new(x, square.sqrt())
     }
-}
-
-/// Where to begin with eight points at a time: at most at the last eight.
-#[inline(always)]
-pub(crate) fn eights([x, ..]: Axes) -> impl Iterator<Item = usize> {
-    let last = x.len().saturating_sub(LANES);
-    (0..x.len()).step_by(LANES).map(
-        #[inline(always)]
-        move |at| at.min(last),
-    )
-}
-
-/// Eight points from `at` on, x counted from `origin`; if there are not so many, some again.
-#[inline(always)]
-pub(crate) fn eight<S: Simd>(simd: S, points: Axes, at: usize, origin: f64) -> [f64x8<S>; 3] {
-    let all = points[0].len();
-    let mut some = [[0.0; LANES]; 3];
-    for (some, from) in some.iter_mut().zip(points) {
-        match from.get(at..at + LANES) {
-            Some(from) => some.copy_from_slice(from),
-            None => (0..LANES).for_each(|i| some[i] = from[i % all]),
-        }
-    }
-    let [x, y, z] = some;
-    [
-        f64x8::from_slice(simd, &x) - origin,
-        f64x8::from_slice(simd, &y),
-        f64x8::from_slice(simd, &z),
-    ]
 }

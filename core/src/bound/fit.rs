@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::slices::Axes;
 use crate::vector::{Point, add_scaled, cross, sub, unit};
-use crate::vertices::Axes;
 
 /// Points that a lid is fitted to, at most.
 const FIT: usize = 64;

@@ -9,8 +9,8 @@ use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::LANES;
 use crate::simd::Set;
+use crate::slices::{Axes, eight, eights};
 use crate::vector::{Interval, Point, add_scaled, dot, length, sub};
-use crate::vertices::{Axes, eight, eights};
 
 /// Where the lids of a tree are: what rounding has to be measured by.
 #[derive(Debug, Clone, Copy)]

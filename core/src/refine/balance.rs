@@ -47,7 +47,7 @@ impl Densities {
 }
 
 /// The densities that make the number of points least.
-pub(super) fn balance(bends: &Bends) -> Densities {
+pub(super) fn balance(simd: Token, bends: &Bends) -> Densities {
     let (m, n) = (bends.us.len(), bends.vs.len());
     let (floor_u, least) = floors(bends);
     let mut v: Vec<f64> = least.iter().map(|l| l * std::f64::consts::SQRT_2).collect();
@@ -60,7 +60,7 @@ pub(super) fn balance(bends: &Bends) -> Densities {
         let sizes: Vec<f64> = v.iter().map(|v| 1.0 / v).collect();
         for k in 0..m {
             let shares = &mut shares[k * n..(k + 1) * n];
-            let row = Row::new(bends, k, &sizes);
+            let row = Row::new(simd, bends, k, &sizes);
             u[k] = row.most(floor_u[k], &mut needed);
             if u[k] > floor_u[k] {
                 row.shares(u[k], &mut needed, shares);
@@ -88,7 +88,7 @@ pub(super) fn balance(bends: &Bends) -> Densities {
         }
         step *= SHORTER;
     }
-    settle(bends, &best.1, &floor_u, &least)
+    settle(simd, bends, &best.1, &floor_u, &least)
 }
 
 /// What a direction needs whatever the other does: one cell to the whole of it, lines for the edges
@@ -112,7 +112,7 @@ fn floors(bends: &Bends) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// The densities for the bends that the cells of a grid were found to have, lines between them.
-pub(super) fn adjust(bends: &Bends) -> Densities {
+pub(super) fn adjust(simd: Token, bends: &Bends) -> Densities {
     let (floor_u, least) = floors(bends);
     let n = bends.vs.len();
     // A cell that is too large is made smaller in the direction in which it bends more.
@@ -134,16 +134,16 @@ pub(super) fn adjust(bends: &Bends) -> Densities {
             }
         }
     }
-    settle(bends, &v, &floor_u, &least)
+    settle(simd, bends, &v, &floor_u, &least)
 }
 
 /// The densities of u that go with those of v, and of v the least that go with these.
-fn settle(bends: &Bends, v: &[f64], floor_u: &[f64], least: &[f64]) -> Densities {
+fn settle(simd: Token, bends: &Bends, v: &[f64], floor_u: &[f64], least: &[f64]) -> Densities {
     let n = bends.vs.len();
     let sizes: Vec<f64> = v.iter().map(|v| 1.0 / v).collect();
     let mut needed = vec![0.0; n];
     let mut u: Vec<f64> = (0..bends.us.len())
-        .map(|k| Row::new(bends, k, &sizes).most(floor_u[k], &mut needed))
+        .map(|k| Row::new(simd, bends, k, &sizes).most(floor_u[k], &mut needed))
         .collect();
     grade(&mut u, &bends.us);
     let mut v = least.to_vec();
@@ -152,13 +152,13 @@ fn settle(bends: &Bends, v: &[f64], floor_u: &[f64], least: &[f64]) -> Densities
     for (k, &density) in u.iter().enumerate() {
         // A hair smaller: where only u bends it takes the whole budget, and nothing is left to divide by.
         same.fill(0.999 / density);
-        let row = Row::new(bends, k, &same);
+        let row = Row::new(simd, bends, k, &same);
         let exchanged = Row {
             own: row.other,
             other: row.own,
             ..row
         };
-        with_simd!(Token::best(), _simd => exchanged.all(&mut needed));
+        with_simd!(simd, _simd => exchanged.all(&mut needed));
         for (v, needed) in v.iter_mut().zip(&needed) {
             *v = v.max(*needed);
         }
@@ -189,6 +189,7 @@ fn density_needed(own: f64, other: f64, twist: f64, both: f64, y: f64) -> f64 {
 
 /// The bends of one row of slots, those along u its own, and the sizes along v.
 struct Row<'a> {
+    simd: Token,
     own: &'a [f64],
     other: &'a [f64],
     twist: &'a [f64],
@@ -197,11 +198,12 @@ struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    fn new(bends: &'a Bends, k: usize, sizes: &'a [f64]) -> Self {
+    fn new(simd: Token, bends: &'a Bends, k: usize, sizes: &'a [f64]) -> Self {
         let n = sizes.len();
         let [own, other, twist, both] =
             [&bends.u, &bends.v, &bends.twist, &bends.both].map(|b| &b[k * n..][..n]);
         Self {
+            simd,
             own,
             other,
             twist,
@@ -212,14 +214,14 @@ impl<'a> Row<'a> {
 
     /// The density of u that all slots need, at least `floor`; what each needs is left in `needed`.
     fn most(&self, floor: f64, needed: &mut [f64]) -> f64 {
-        with_simd!(Token::best(), _simd => self.all(needed));
+        with_simd!(self.simd, _simd => self.all(needed));
         needed.iter().fold(floor, |a, &b| a.max(b))
     }
 
     /// The share of each slot in what is needed at most: by how much the one falls as the other's v grows,
     /// spread over all that are nearly the worst. In place of what they need.
     fn shares(&self, most: f64, needed: &mut [f64], shares: &mut [f64]) {
-        with_simd!(Token::best(), _simd => self.weighed(most, needed, shares));
+        with_simd!(self.simd, _simd => self.weighed(most, needed, shares));
         let all: f64 = needed.iter().sum();
         shares.iter_mut().for_each(|s| *s /= all);
     }

@@ -18,8 +18,8 @@ use rayon::prelude::*;
 use super::balance::Grid;
 use super::near::{self, Closeness, look};
 use crate::evaluate::{Isoline, Isolines, Net};
-use crate::fours::{FOUR, Four, cross4, dot4, four_points, sub4};
 use crate::simd::{Token, with_simd};
+use crate::slices::{Axes, FOUR, Four, cross4, dot4, four_points, sub4};
 use crate::surface::Direction;
 use crate::vector::{Point, add_scaled, cross, dot, length, sub};
 
@@ -79,7 +79,7 @@ pub(super) fn measure(
     let (inside, corners) = (Isolines::new(net, &inside), Isolines::new(net, &corners));
     let within = Running::default();
     let chunks = rows.par_chunks(CHUNK).map(|rows| {
-        let mut strip = Strip::new(columns);
+        let mut strip = Strip::new(net.simd, columns);
         let mut exceeding = Vec::new();
         for (k, &row) in rows.iter().enumerate() {
             let follows = k > 0 && rows[k - 1] + 1 == row;
@@ -153,7 +153,7 @@ pub(super) fn probe(net: &Net, grid: &Grid) -> Vec<Vec<[f64; 3]>> {
     let (inside, corners) = places(grid, 2, &columns);
     let (inside, corners) = (Isolines::new(net, &inside), Isolines::new(net, &corners));
     let chunks = rows.par_chunks(CHUNK).map(|rows| {
-        let mut strip = Strip::new(&columns);
+        let mut strip = Strip::new(net.simd, &columns);
         let mut found = vec![[0.0; 3]; rows.len() * n];
         for (&row, found) in rows.iter().zip(found.chunks_exact_mut(n)) {
             strip.place::<false>(&corners, grid, row, row != rows[0]);
@@ -162,7 +162,7 @@ pub(super) fn probe(net: &Net, grid: &Grid) -> Vec<Vec<[f64; 3]>> {
             for (a, b, k) in [(0, 1, 1), (1, 0, 0), (1, 1, 2)] {
                 let facets = &strip.facets[usize::from(a <= b)];
                 let samples = strip.samples[a].within(b * n..(b + 1) * n);
-                with_simd!(Token::best(), simd => facets.off(simd, found, k, samples));
+                with_simd!(net.simd, simd => facets.off(simd, found, k, samples));
             }
         }
         found
@@ -201,6 +201,7 @@ pub(super) fn part(lines: &[f64], i: usize, part: usize, parts: usize) -> f64 {
 
 /// One row of cells, and room for its samples.
 struct Strip {
+    simd: Token,
     cells: usize,
     bounds: Vec<[f64; FOUR]>,
     /// From a cell's near corner to its far one.
@@ -223,11 +224,12 @@ struct Planes(Vec<Numbers>);
 type Numbers = [[f64; FOUR]; NUMBERS];
 
 impl Strip {
-    fn new(columns: &[usize]) -> Self {
+    fn new(simd: Token, columns: &[usize]) -> Self {
         let cells = columns.len();
         let fours = cells.div_ceil(FOUR);
         let planes = || Planes(vec![[[0.0; FOUR]; NUMBERS]; fours]);
         Self {
+            simd,
             cells,
             bounds: vec![[0.0; FOUR]; fours],
             to_far: if beside(columns) { 1 } else { cells },
@@ -254,7 +256,7 @@ impl Strip {
             for b in usize::from(a == 0)..across {
                 let facets = &self.facets[usize::from(a * across <= b * along)];
                 let (bounds, samples) = (&mut self.bounds[..], line.within(b * n..(b + 1) * n));
-                with_simd!(Token::best(), simd => facets.raise(simd, bounds, samples));
+                with_simd!(self.simd, simd => facets.raise(simd, bounds, samples));
             }
         }
     }
@@ -303,7 +305,7 @@ impl Strip {
         let [b, c] = [0, far_side].map(|from| far.within(from..from + n));
         for (facets, corners) in self.facets.iter_mut().zip([[a, b, c], [a, c, d]]) {
             let bounds = &mut self.bounds[..];
-            with_simd!(Token::best(), simd => facets.set::<_, SIDEWAYS>(simd, bounds, corners));
+            with_simd!(self.simd, simd => facets.set::<_, SIDEWAYS>(simd, bounds, corners));
         }
     }
 }
@@ -316,7 +318,7 @@ impl Planes {
         &mut self,
         simd: S,
         bounds: &mut [[f64; FOUR]],
-        corners: [[&[f64]; 3]; 3],
+        corners: [Axes; 3],
     ) {
         let one = f64x4::splat(simd, 1.0);
         let beyond = f64x4::splat(simd, f64::INFINITY);
@@ -350,7 +352,7 @@ impl Planes {
 
     /// The signed distances of a sample of each cell from the plane of its facet.
     #[inline(always)]
-    fn off<S: Simd>(&self, simd: S, found: &mut [[f64; 3]], k: usize, samples: [&[f64]; 3]) {
+    fn off<S: Simd>(&self, simd: S, found: &mut [[f64; 3]], k: usize, samples: Axes) {
         let mut j = 0;
         for (f, found) in self.0.iter().zip(found.chunks_mut(FOUR)) {
             let off = form(simd, f, 0, four_points(simd, samples, j));
@@ -363,7 +365,7 @@ impl Planes {
 
     /// Raises the bounds to the squares of what a sample of each cell deviates at most.
     #[inline(always)]
-    fn raise<S: Simd>(&self, simd: S, bounds: &mut [[f64; FOUR]], samples: [&[f64]; 3]) {
+    fn raise<S: Simd>(&self, simd: S, bounds: &mut [[f64; FOUR]], samples: Axes) {
         let (none, one) = (f64x4::splat(simd, 0.0), f64x4::splat(simd, 1.0));
         let without = f64x4::splat(simd, f64::INFINITY);
         let mut j = 0;

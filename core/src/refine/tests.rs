@@ -1,5 +1,6 @@
 use super::measure::to_triangle;
 use super::*;
+use crate::simd::Simd;
 use crate::surface::tests::quarter_cylinder;
 use crate::surface::{Direction, MAX_DEGREE};
 use crate::vector::Point;
@@ -136,6 +137,32 @@ fn deviation(surface: &Surface, us: &[f64], vs: &[f64]) -> f64 {
         }
     }
     worst
+}
+
+#[test]
+fn every_level_lays_the_same_lines() {
+    let surfaces = [
+        wavy(1),
+        wavy(2),
+        wavy(3),
+        wavy(4),
+        wavy(5),
+        pointed(),
+        creased(),
+    ];
+    let rational = quarter_cylinder(20.0, 30.0);
+    for surface in surfaces.iter().chain([&rational]) {
+        let lines = |simd: Simd| {
+            let net = Net::by(simd.token(), surface);
+            let lines = refine_net("s", &net, 0.02).expect("reached");
+            let points = net.grid(&lines.us, &lines.vs);
+            (lines.us, lines.vs, lines.deviation, points)
+        };
+        let scalar = lines(Simd::Scalar);
+        for simd in Simd::available() {
+            assert_eq!(lines(simd), scalar, "{simd}");
+        }
+    }
 }
 
 #[test]

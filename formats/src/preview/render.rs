@@ -13,7 +13,7 @@ use super::sheet::Sheet;
 use crate::raster;
 
 /// Size of the picture, pixels.
-pub const SIZE: (u32, u32) = (1600, 1000);
+pub const SIZE: (u32, u32) = (1200, 750);
 
 /// A red, green and blue.
 pub type Colour = [u8; 3];
