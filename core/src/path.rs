@@ -50,11 +50,12 @@ pub struct Waypoint {
 
 impl ToolPath {
     /// All positions, in the order in which a machine takes them.
-    pub fn waypoints(&self) -> impl Iterator<Item = Waypoint> + '_ {
+    pub fn waypoints(&self) -> impl ExactSizeIterator<Item = Waypoint> + '_ {
         let whole = (0..).zip(&self.touches);
         let mut whole = whole.map(|(i, &touch)| (Index::whole(i), touch)).peekable();
         let mut between = self.between.iter().map(|b| (b.index, b.touch)).peekable();
-        std::iter::from_fn(move || {
+        // As many as there are, so that it is known how many they are.
+        (0..self.touches.len() + self.between.len()).map(move |_| {
             let inserted = match (whole.peek(), between.peek()) {
                 (Some(w), Some(b)) => b.0 < w.0,
                 (w, _) => w.is_none(),
@@ -64,13 +65,13 @@ impl ToolPath {
             } else {
                 whole.next()
             };
-            let (index, touch) = next?;
-            Some(Waypoint {
+            let (index, touch) = next.expect("one of them is left");
+            Waypoint {
                 index,
                 x: self.trajectory.travel_at(index.floor(), index.share()),
                 angle: self.trajectory.angle_at(index.floor(), index.share()),
                 touch,
-            })
+            }
         })
     }
 
@@ -115,9 +116,7 @@ impl ToolPath {
             angle: w.angle,
             height: w.touch.map(|t| t.height),
         };
-        let mut positions = Vec::with_capacity(self.touches.len() + self.between.len());
-        positions.extend(self.waypoints().map(position));
-        positions
+        self.waypoints().map(position).collect()
     }
 }
 

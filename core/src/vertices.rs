@@ -33,7 +33,13 @@ impl Vertices {
         let lots = blocks.par_chunks(LOT).map(|blocks| {
             let mut lot = Lot::default();
             for block in blocks {
-                lot.starts.push(lot.at[0].len());
+                let next = lot.at[0].len();
+                if lot.starts.len() == 1 {
+                    // Most leaves have as many as the first.
+                    let all = |axis: &mut Vec<f64>| axis.reserve(next * blocks.len());
+                    lot.at.iter_mut().for_each(all);
+                }
+                lot.starts.push(next);
                 vertices(block, &mut |some| {
                     for (k, axis) in lot.at.iter_mut().enumerate() {
                         axis.extend(some.iter().map(|p| p[k]));

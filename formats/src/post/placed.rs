@@ -72,14 +72,15 @@ impl Placed {
         let stations = passes.iter().flat_map(|p| p.course);
         let highest = stations.map(|s| s.axes[1]).chain(clear);
         let safe = highest.fold(f64::MIN, f64::max) + program.clearance;
+        let count = passes.iter().map(|p| p.course.len()).sum();
         let mut placed = Self {
-            increments: Vec::new(),
+            increments: Vec::with_capacity(count),
             legs: Vec::new(),
             safe,
             retracted: said(1, safe),
-            stations: Vec::new(),
+            stations: Vec::with_capacity(count),
             scale,
-            spots: Vec::new(),
+            spots: Vec::with_capacity(count),
         };
         let mut turned = 0.0;
         for pass in passes {
