@@ -111,7 +111,9 @@ fn scatter(row: usize, middles: &[Point], leaf: usize, blocks: &mut Vec<Block>) 
     let mut lots = vec![&mut numbers[..]];
     let at = |n: &u32| middles[*n as usize];
     while let Some(lot) = lots.pop() {
-        if lot.len() <= leaf {
+        if lot.is_empty() {
+            // A row from outside may have nothing in it.
+        } else if lot.len() <= leaf {
             let sum = lot
                 .iter()
                 .fold([0.0; 3], |sum, n| add_scaled(sum, 1.0, at(n)));
@@ -243,4 +245,23 @@ pub(crate) fn facet_leaf(
         }
     }
     FacetLeaf::new(points, &facets[..count])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_row_with_nothing_in_it_there_is_no_block() {
+        let isoline = RowKind::Isoline { joins_next: false };
+        for kind in [RowKind::Slab { facets: Vec::new() }, isoline] {
+            let row = Row {
+                id: 0,
+                points: Vec::new(),
+                kind,
+            };
+            assert!(point_blocks(std::slice::from_ref(&row)).is_empty());
+            assert!(facet_blocks(&[row]).is_empty());
+        }
+    }
 }

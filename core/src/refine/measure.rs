@@ -176,8 +176,8 @@ fn beside(columns: &[usize]) -> bool {
 }
 
 /// The parameters in v of the samples, all first ones of the cells, then all second ones …: what is computed
-/// alike lies side by side; and of the corners of the cells: all near ones, then all
-/// far ones, or those of columns that follow each other only once.
+/// alike lies side by side. And those of the corners of the cells: all near ones, then all far ones, or those
+/// of columns that follow each other only once.
 fn places(grid: &Grid, across: usize, columns: &[usize]) -> (Vec<f64>, Vec<f64>) {
     let at = |j, b| part(&grid.vs, j, b, across);
     let inside = (0..across).flat_map(|b| columns.iter().map(move |&j| at(j, b)));
