@@ -30,10 +30,7 @@ pub(crate) struct Passes {
 /// Makes the passes of what was digitized: for the roughing, if there is any, and for the finishing pass.
 pub(crate) fn passes(file: &JobFile, mut digitized: Vec<ToolPath>) -> Result<Passes> {
     let cutter = &file.job.cutter;
-    let kept = |path: ToolPath| match file.keep_outs.as_slice() {
-        [] => (path, Vec::new()),
-        keep_outs => keep_out(&path, cutter, keep_outs),
-    };
+    let kept = |path: ToolPath| keep_out(path, cutter, &file.keep_outs);
     let digitized_finish = digitized.pop().ok_or(Error::Interrupted)?;
     let outside = file
         .stock

@@ -62,11 +62,10 @@ impl KeepOut {
 
 /// The path that keeps out of all of these, and what each of them did. A raised position touches the
 /// keep-out that is highest.
-pub fn keep_out(
-    path: &ToolPath,
-    cutter: &Cutter,
-    keep_outs: &[KeepOut],
-) -> (ToolPath, Vec<Raised>) {
+pub fn keep_out(path: ToolPath, cutter: &Cutter, keep_outs: &[KeepOut]) -> (ToolPath, Vec<Raised>) {
+    if keep_outs.is_empty() {
+        return (path, Vec::new());
+    }
     let mut raised = vec![Raised::default(); keep_outs.len()];
     let solids: Vec<Solid> = keep_outs.iter().map(KeepOut::solid).collect();
     let touches = path.along().map(|(waypoint, travel, direction)| {
@@ -149,7 +148,7 @@ mod tests {
         let ball = Cutter::ball(8.0).expect("valid");
         for kind in [MotionKind::Helix, MotionKind::Rings] {
             let path = path(kind);
-            let (kept, raised) = keep_out(&path, &ball, &[CHUCK]);
+            let (kept, raised) = keep_out(path.clone(), &ball, &[CHUCK]);
             let before: Vec<_> = path.waypoints().collect();
             let after: Vec<_> = kept.waypoints().collect();
             let mut count = 0;
@@ -186,7 +185,7 @@ mod tests {
     fn no_move_enters_one() {
         let cutter = Cutter::torus(10.0, 4.0).expect("valid");
         for kind in [MotionKind::Helix, MotionKind::Rings] {
-            let (kept, _) = keep_out(&path(kind), &cutter, &[CHUCK]);
+            let (kept, _) = keep_out(path(kind), &cutter, &[CHUCK]);
             let course = crate::course::course(&kept).expect("contact");
             for ends in course.windows(2) {
                 for share in 0..=50 {
@@ -216,8 +215,8 @@ mod tests {
             ..CHUCK
         };
         let ball = Cutter::ball(8.0).expect("valid");
-        assert_eq!(keep_out(&path, &ball, &[]), (path.clone(), vec![]));
-        let (same, raised) = keep_out(&path, &ball, &[far]);
+        assert_eq!(keep_out(path.clone(), &ball, &[]), (path.clone(), vec![]));
+        let (same, raised) = keep_out(path.clone(), &ball, &[far]);
         assert_eq!((same, raised), (path, vec![Raised::default()]));
     }
 
