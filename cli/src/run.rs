@@ -55,22 +55,16 @@ fn one(args: &args::Run, output: &Path, stop: &CancellationToken) -> Result<()> 
                 let run = here::run_all(task, threads, simd);
                 return run.instrument(info_span!("digitize")).await;
             }
-            let Task {
-                part,
-                jobs,
-                display,
-                stop,
-            } = task;
-            let progress = progress(display);
+            let progress = progress(task.display);
             let workers = Workers {
                 number: workers,
                 threads: threads.unwrap_or(1),
                 simd,
                 otlp: args.traces.otlp.as_ref().map(|to| &*to.url),
             };
-            let run = cluster::run(part, jobs, sharing, workers, progress);
+            let run = cluster::run(task.part, task.jobs, sharing, workers, progress);
             // Dropping it stops the workers.
-            Ok(unless(stop, run).await?.into())
+            Ok(unless(task.stop, run).await?.into())
         },
     )
 }
