@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use fearless_simd::{Simd, f64x4, prelude::*};
 
-use crate::simd::{Token, with_simd};
+use crate::simd::{Simd as Level, Token, with_simd};
 use crate::slices::{Axes, FOUR};
 use crate::surface::{Basis, Surface};
 use crate::vector::Point;
@@ -30,7 +30,7 @@ pub struct Net<'a> {
 impl<'a> Net<'a> {
     /// Copies the poles, which is worth it once for several grids.
     pub fn new(surface: &'a Surface) -> Self {
-        Self::by(Token::best(), surface)
+        Self::by(Level::best().token(), surface)
     }
 
     /// The same, to be evaluated by a level that is told.

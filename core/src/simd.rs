@@ -103,15 +103,6 @@ macro_rules! with_simd {
 }
 pub(crate) use with_simd;
 
-impl Token {
-    /// That of the best level that this machine has.
-    pub fn best() -> Self {
-        let mut levels = NAMES.iter().rev();
-        let best = levels.find_map(|(simd, _)| simd.try_token());
-        best.unwrap_or(Self::Scalar(Fallback::new()))
-    }
-}
-
 impl Simd {
     /// The best that this machine has.
     pub fn best() -> Self {
