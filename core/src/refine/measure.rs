@@ -16,7 +16,7 @@ use fearless_simd::{Simd, f64x4, prelude::*};
 use rayon::prelude::*;
 
 use super::balance::Grid;
-use super::near::{self, Closeness, look};
+use super::near::{Closeness, look};
 use crate::evaluate::{Isoline, Isolines, Net};
 use crate::simd::{Token, with_simd};
 use crate::slices::{Axes, FOUR, Four, cross4, dot4, four_points, sub4};
@@ -97,13 +97,6 @@ pub(super) fn measure(
                 let last = row + 2 == grid.us.len() || column + 2 == grid.vs.len();
                 let known = within.get();
                 if bounds[j] <= known * known && !last {
-                    continue;
-                }
-                let own = (!last)
-                    .then(|| strip.deviation(j, density, known))
-                    .flatten();
-                if let Some(deviation) = own.filter(|&d| d <= tolerance) {
-                    within.raise(deviation);
                     continue;
                 }
                 let closeness = look(net, grid, density, [row, column], [known, tolerance]);
@@ -259,27 +252,6 @@ impl Strip {
                 with_simd!(self.simd, simd => facets.raise(simd, bounds, samples));
             }
         }
-    }
-
-    /// How far the samples of a cell deviate, as [`look`] tells it of a cell with next ones; `None` if that
-    /// takes the facets around it.
-    fn deviation(&self, j: usize, [along, across]: [usize; 2], known: f64) -> Option<f64> {
-        let far = j + self.to_far;
-        let [a, b] = [j, far].map(|j| self.near.point(j));
-        let [c, d] = [j, far].map(|j| self.far.point(j));
-        let own = near::facets(a, b, c, d);
-        let mut found = 0.0_f64;
-        for (a, line) in self.samples.iter().enumerate() {
-            for b in 0..across {
-                let side = usize::from(a * across <= b * along);
-                let (deviation, over) = to_triangle(line.point(b * self.cells + j), own[side]);
-                if !over && deviation > known.max(found) {
-                    return None;
-                }
-                found = found.max(deviation);
-            }
-        }
-        Some(found)
     }
 
     /// Prepares the facets of a row, `SIDEWAYS` as well or only their planes.

@@ -75,7 +75,7 @@ fn to_nearest(p: Point, facets: &[[Point; 3]], known: f64, enough: f64) -> f64 {
 }
 
 /// The facets of a cell from its corners, u growing first: as in `row::facets`.
-pub(super) fn facets(a: Point, b: Point, c: Point, d: Point) -> [[Point; 3]; 2] {
+fn facets(a: Point, b: Point, c: Point, d: Point) -> [[Point; 3]; 2] {
     [[a, c, d], [a, d, b]]
 }
 
