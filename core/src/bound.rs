@@ -156,16 +156,6 @@ fn turn<S: Simd>([x, y, z]: Eight<S>, cos: f32, sin: f32, by: [f32; 3]) -> Eight
     ]
 }
 
-#[inline(always)]
-fn sub3<S: Simd>(a: Eight<S>, b: Eight<S>) -> Eight<S> {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn dot3<S: Simd>(a: Eight<S>, b: Eight<S>) -> f32x8<S> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 /// `a + s·b`.
 #[inline(always)]
 fn add3<S: Simd>(a: Eight<S>, s: f32x8<S>, b: Eight<S>) -> Eight<S> {

@@ -32,25 +32,6 @@ pub(crate) fn four_points<S: Simd>(simd: S, [x, y, z]: Axes, at: usize) -> Four<
     [four(simd, x, at), four(simd, y, at), four(simd, z, at)]
 }
 
-#[inline(always)]
-pub(crate) fn sub4<S: Simd>(a: Four<S>, b: Four<S>) -> Four<S> {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-pub(crate) fn dot4<S: Simd>(a: Four<S>, b: Four<S>) -> f64x4<S> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-pub(crate) fn cross4<S: Simd>(a: Four<S>, b: Four<S>) -> Four<S> {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
 /// Where to begin with eight points at a time: at most at the last eight.
 #[inline(always)]
 pub(crate) fn eights([x, ..]: Axes) -> impl Iterator<Item = usize> {

@@ -3,12 +3,14 @@
 //! Anything that decides a height is computed here and not through a general library, so that the
 //! order of the operations, and with it every bit of the result, is written down in one place.
 
+use std::ops::{Add, Mul, Sub};
+
 /// A point or a vector, mm.
 pub type Point = [f64; 3];
 
-/// `a − b`.
+/// `a − b`, of points or of several side by side.
 #[inline(always)]
-pub fn sub(a: Point, b: Point) -> Point {
+pub fn sub<T: Copy + Sub<Output = T>>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
@@ -18,15 +20,15 @@ pub fn add_scaled(a: Point, s: f64, b: Point) -> Point {
     [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
 }
 
-/// Scalar product.
+/// Scalar product, of vectors or of several side by side.
 #[inline(always)]
-pub fn dot(a: Point, b: Point) -> f64 {
+pub fn dot<T: Copy + Add<Output = T> + Mul<Output = T>>(a: [T; 3], b: [T; 3]) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Vector product.
+/// Vector product, of vectors or of several side by side.
 #[inline(always)]
-pub fn cross(a: Point, b: Point) -> Point {
+pub fn cross<T: Copy + Sub<Output = T> + Mul<Output = T>>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],

@@ -2,12 +2,12 @@
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-use super::{Plane, Slopes, add3, sub3, turn};
+use super::{Plane, Slopes, add3, turn};
 use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::supports;
 use crate::tolerance::BOUND_SLACK;
-use crate::vector::{Point, dot, length};
+use crate::vector::{Point, dot, length, sub};
 
 /// Facets that lie together as their bounds see them: from a middle on, and heights from a base on.
 #[derive(Debug, Clone, Copy)]
@@ -83,7 +83,7 @@ pub(crate) fn facet_bounds<S: Simd>(
     let a = turn(corners[0], near.cos, near.sin, near.middle);
     let b = turn(corners[1], near.cos, near.sin, near.middle);
     let c = turn(corners[2], near.cos, near.sin, near.middle);
-    let (ab, ac) = (sub3(b, a), sub3(c, a));
+    let (ab, ac) = (sub(b, a), sub(c, a));
     let n = [
         ab[1] * ac[2] - ab[2] * ac[1],
         ab[2] * ac[0] - ab[0] * ac[2],
@@ -118,7 +118,7 @@ pub(crate) fn facet_bounds<S: Simd>(
         c_wins.select(c[2], b_wins.select(b[2], a[2])),
     ];
     // F's slope towards that corner, here and there, tells about where it vanishes.
-    let way = sub3(highest, start);
+    let way = sub(highest, start);
     let here = first.along(way);
     let there = Slopes::at(simd, cutter, highest).along(way);
     let share = here / (here - there);

@@ -4,7 +4,7 @@
 use fearless_simd::{Simd, f32x8, f64x8, mask32x8, prelude::*};
 
 use super::fit::{axes, few, paraboloid};
-use super::{Eight, Slopes, dot3, load, turn};
+use super::{Eight, Slopes, load, turn};
 use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::LANES;
@@ -352,11 +352,11 @@ impl<S: Simd> Slopes<S> {
             self.by_z * view.sin + view.cos,
             self.by_z * view.cos - view.sin,
         ];
-        let by_w = dot3(slope, normal);
+        let by_w = dot(slope, normal);
         let outward = by_w.max(0.0);
         let along_u = rise(
             simd,
-            dot3(slope, u).abs(),
+            dot(slope, u).abs(),
             outward * f32x8::from_slice(simd, &lids.a),
         );
         let by_v = (slope[1] * vy + slope[2] * vz).abs();

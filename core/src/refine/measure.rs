@@ -19,7 +19,7 @@ use super::balance::Grid;
 use super::near::{Closeness, look};
 use crate::evaluate::{Isoline, Isolines, Net};
 use crate::simd::{Token, with_simd};
-use crate::slices::{Axes, FOUR, Four, cross4, dot4, four_points, sub4};
+use crate::slices::{Axes, FOUR, Four, four_points};
 use crate::surface::Direction;
 use crate::vector::{Point, add_scaled, cross, dot, length, sub};
 
@@ -299,21 +299,21 @@ impl Planes {
             let a = four_points(simd, corners[0], j);
             let b = four_points(simd, corners[1], j);
             let c = four_points(simd, corners[2], j);
-            let (ab, ac) = (sub4(b, a), sub4(c, a));
-            let normal = cross4(ab, ac);
-            let square = dot4(normal, normal);
+            let (ab, ac) = (sub(b, a), sub(c, a));
+            let normal = cross(ab, ac);
+            let square = dot(normal, normal);
             let flat = square.simd_le(0.0);
             *bound = *flat.select(beyond, f64x4::from_slice(simd, bound));
             let square = square.simd_gt(0.0).select(square, one);
             set_form(f, 0, normal, one / square.sqrt(), a);
             if SIDEWAYS {
                 let scale = one / square;
-                set_form(f, 4, cross4(ac, normal), scale, a);
-                set_form(f, 8, cross4(normal, ab), scale, a);
+                set_form(f, 4, cross(ac, normal), scale, a);
+                set_form(f, 8, cross(normal, ab), scale, a);
                 // Where the other two coordinates can make up for one that is negative, a sample comes to
                 // the facet along either edge from that corner; the shorter one bounds its distance.
-                let bc = sub4(c, b);
-                let (ab, ac, bc) = (dot4(ab, ab), dot4(ac, ac), dot4(bc, bc));
+                let bc = sub(c, b);
+                let (ab, ac, bc) = (dot(ab, ab), dot(ac, ac), dot(bc, bc));
                 f[12] = *ab.min(bc).sqrt();
                 f[13] = *ac.min(bc).sqrt();
                 f[14] = *ab.min(ac).sqrt();
@@ -364,7 +364,7 @@ impl Planes {
 fn set_form<S: Simd>(f: &mut Numbers, k: usize, v: Four<S>, scale: f64x4<S>, a: Four<S>) {
     let v = [v[0] * scale, v[1] * scale, v[2] * scale];
     (f[k], f[k + 1], f[k + 2]) = (*v[0], *v[1], *v[2]);
-    f[k + 3] = *-dot4(v, a);
+    f[k + 3] = *-dot(v, a);
 }
 
 /// Those functions of points.
@@ -375,7 +375,7 @@ fn form<S: Simd>(simd: S, f: &Numbers, k: usize, p: Four<S>) -> f64x4<S> {
         f64x4::from_slice(simd, &f[k + 1]),
         f64x4::from_slice(simd, &f[k + 2]),
     ];
-    dot4(along, p) + f64x4::from_slice(simd, &f[k + 3])
+    dot(along, p) + f64x4::from_slice(simd, &f[k + 3])
 }
 
 /// Distance from `p` to the triangle, and whether it lies over it.
