@@ -54,16 +54,20 @@ pub fn touch_point(cutter: &Cutter, pose: &Pose, p: Point) -> Option<Touch> {
 /// A height that the cutter is surely touched at or above, given a place on the part, or minus infinity.
 #[inline(always)]
 pub fn least_height(cutter: &Cutter, pose: &Pose, contact: Point) -> f64 {
-    let [d, y, z] = pose.face(contact);
+    let seen = pose.face(contact);
     // Rounding has put the contact beside its facet, which matters where F is steep.
-    let within = WELL_WITHIN * cutter.half_width();
-    match cutter.profile(d) {
-        Some(m) if d.abs() <= within && z.abs() <= WELL_WITHIN * m => {
-            let size = cutter.max_radius() + y.abs() + pose.x.abs();
-            y + ((m - z) * (m + z)).sqrt() - FLOOR_SLACK * size
-        }
-        _ => f64::NEG_INFINITY,
-    }
+    height_well_within(cutter, seen).map_or(f64::NEG_INFINITY, |height| {
+        let size = cutter.max_radius() + seen[1].abs() + pose.x.abs();
+        height - FLOOR_SLACK * size
+    })
+}
+
+/// The height of a point seen from the cutter that is well within its reach, where F is smooth; `None` for others.
+#[inline(always)]
+pub fn height_well_within(cutter: &Cutter, [d, y, z]: Point) -> Option<f64> {
+    let m = cutter.profile(d)?;
+    let within = d.abs() <= WELL_WITHIN * cutter.half_width() && z.abs() <= WELL_WITHIN * m;
+    within.then(|| y + ((m - z) * (m + z)).sqrt())
 }
 
 /// What rounding may take from the height at a contact, relative to the lengths involved.
@@ -71,43 +75,63 @@ const FLOOR_SLACK: f64 = 64.0 * BOUND_SLACK;
 
 /// The greatest height over a facet, or `None` if no point of it is in reach.
 pub fn touch_facet(cutter: &Cutter, pose: &Pose, corners: [Point; 3]) -> Option<Touch> {
-    touch_seen(
-        cutter,
-        corners,
-        corners.map(|p| pose.face(p)),
-        f64::NEG_INFINITY,
-    )
+    let seen = corners.map(|p| pose.face(p));
+    touch_seen(cutter, corners, seen, f64::NEG_INFINITY).map(|(touch, _)| touch)
 }
 
-/// The same, given how the cutter sees the corners; also `None` if that is surely below `floor`.
+/// What of a facet is touched, its corners told by their places.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Spot {
+    Corner(usize),
+    /// Between two corners.
+    Edge(usize, usize),
+    Inside,
+}
+
+/// The same, and what of the facet is touched, given how the cutter sees the corners; also `None` if that is
+/// surely below `floor`.
 #[inline]
 pub fn touch_seen(
     cutter: &Cutter,
     corners: [Point; 3],
     seen: [Point; 3],
     floor: f64,
-) -> Option<Touch> {
+) -> Option<(Touch, Spot)> {
     let weights = weights_of_support(cutter, seen);
     if let Some([_, s, t]) = weights.filter(|w| w.iter().all(|&w| w >= 0.0)) {
         let at =
             |c: [Point; 3]| add_scaled(add_scaled(c[0], s, sub(c[1], c[0])), t, sub(c[2], c[0]));
-        return Some(Touch {
+        let touch = Touch {
             height: height_within(cutter, at(seen)),
             contact: at(corners),
-        });
+        };
+        return Some((touch, Spot::Inside));
     }
-    let mut best: Option<Touch> = None;
+    let mut best: Option<(Touch, Spot)> = None;
     for (opposite, i, j) in [(2, 0, 1), (0, 1, 2), (1, 2, 0)] {
         // F rises towards the support point, so that only edges which face it can be touched.
         if weights.is_some_and(|w| w[opposite] > FACING) {
             continue;
         }
+        // Both facets beside an edge go along it the same way, and find the same.
+        let (i, j) = if corners[i] < corners[j] {
+            (i, j)
+        } else {
+            (j, i)
+        };
         let Some((t, height)) = touch_edge(cutter, seen[i], seen[j], floor) else {
             continue;
         };
-        if best.is_none_or(|b| height > b.height) {
+        if best.is_none_or(|(b, _)| height > b.height) {
             let contact = along(corners[i], corners[j], t);
-            best = Some(Touch { height, contact });
+            let spot = if t == 0.0 {
+                Spot::Corner(i)
+            } else if t == 1.0 {
+                Spot::Corner(j)
+            } else {
+                Spot::Edge(i, j)
+            };
+            best = Some((Touch { height, contact }, spot));
         }
     }
     best

@@ -17,7 +17,7 @@ use crate::contact::{Pose, least_height};
 use crate::cutter::Cutter;
 use crate::job::{Contact, Job, Local, Method, Window};
 use crate::lanes::LANES;
-use crate::leaf::{Best, FacetLeaf, Leaf, PointLeaf};
+use crate::leaf::{Best, FacetLeaf, Leaf, PointLeaf, Start};
 use crate::local::{self, Grids};
 use crate::motion::{Motion, Trajectory};
 use crate::path::{SubTrajectory, ToolPath, Touch, stitch};
@@ -25,7 +25,7 @@ use crate::record::Counters;
 use crate::row::{Row, starts};
 use crate::simd::{Simd, Token};
 use crate::sweep::{self, AllFacets, Sweep};
-use crate::tree::{Start, Tree};
+use crate::tree::Tree;
 
 /// Positions that one thread takes at a time: these many at least, and a few revolutions.
 const CHUNK: u64 = 256;

@@ -13,13 +13,13 @@ use crate::blocks::runs;
 use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::job::{Culling, Window};
-use crate::leaf::{Best, PointLeaf};
+use crate::leaf::{Best, PointLeaf, Start};
 use crate::path::Touch;
 use crate::record::Counters;
 use crate::row::{Row, RowKind, row_and_place};
 use crate::simd::{Token, with_simd};
 use crate::sweep::Sweep;
-use crate::tree::{Start, Tree};
+use crate::tree::Tree;
 use crate::vector::{Interval, Point, cross, dot, length, sub};
 
 /// The grids of the surfaces that rows belong to.

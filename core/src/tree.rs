@@ -11,10 +11,9 @@ use rayon::prelude::*;
 
 use crate::blocks::{Block, longest_side};
 use crate::bound::{Frame, Lids, Swing, View, lid_bounds, swung_lid_bounds};
-use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::{LANES, Lanes, lanes};
-use crate::leaf::{Best, Leaf};
+use crate::leaf::{Batch, Best, Leaf, Start};
 use crate::record::Counters;
 use crate::simd::{Set, Token, with_simd};
 use crate::vector::Point;
@@ -137,13 +136,22 @@ impl<L: Leaf> Tree<L> {
             return;
         };
         let mut views = [View::new(&self.frame, cutter, &middle.pose); LANES];
-        let mut tops = [Top::new::<L>(cutter, middle, 0.0); LANES];
+        let place = |start: &Start| start.place.map(|c| c as f32);
+        let ceiling = |start: &Start| L::ceiling(cutter, &start.pose, start.place);
+        let mut places = [place(middle); LANES];
+        let mut batch = Batch {
+            cutter,
+            starts,
+            best,
+            ceilings: [ceiling(middle); LANES],
+        };
         let mut heights = [f32::INFINITY; LANES];
         for lane in lanes(active) {
             let start = &starts[lane];
             views[lane] = View::new(&self.frame, cutter, &start.pose);
-            tops[lane] = Top::new::<L>(cutter, start, best[lane].height);
-            heights[lane] = tops[lane].height;
+            places[lane] = place(start);
+            batch.ceilings[lane] = ceiling(start);
+            heights[lane] = under(batch.best[lane].height);
         }
         let swing = Swing::new(&middle.pose, starts.iter().map(|start| start.pose));
         let mut open = Stack::new();
@@ -153,19 +161,13 @@ impl<L: Leaf> Tree<L> {
             let alive = alive & active;
             if child & INNER == 0 {
                 let leaf = &self.leaves[child as usize];
-                for lane in lanes(alive) {
-                    let (start, best) = (&starts[lane], &mut best[lane]);
-                    let before = (best.height, best.id);
-                    let (pose, ceiling) = (&start.pose, &tops[lane].ceiling);
-                    counters.evaluations +=
-                        leaf.search(simd, &self.points, cutter, pose, ceiling, best);
-                    if before != (best.height, best.id) {
-                        let [d, _, z] = pose.face(best.contact);
-                        let place = [d, z];
-                        let start = Start { place, ..*start };
-                        tops[lane] = Top::new::<L>(cutter, &start, best.height);
-                        heights[lane] = tops[lane].height;
-                    }
+                let (evaluated, raised) = leaf.search(simd, &self.points, &mut batch, alive);
+                counters.evaluations += evaluated;
+                for lane in lanes(raised) {
+                    let best = &batch.best[lane];
+                    let [d, _, z] = starts[lane].pose.face(best.contact);
+                    places[lane] = [d as f32, z as f32];
+                    heights[lane] = under(best.height);
                 }
                 continue;
             }
@@ -176,7 +178,7 @@ impl<L: Leaf> Tree<L> {
             if over_nodes && alive.count_ones() > 1 {
                 // What one position's view loses for the others is little beside a large lid's slack.
                 counters.nodes += 1;
-                let place = tops[from].place;
+                let place = places[from];
                 let all = swung_lid_bounds(simd, cutter, &views, from, &swing, place, &node.lids);
                 for lane in lanes(alive) {
                     high |= all[lane].simd_ge(heights[lane]).to_bitmask();
@@ -185,7 +187,7 @@ impl<L: Leaf> Tree<L> {
             } else {
                 counters.nodes += u64::from(alive.count_ones());
                 for lane in lanes(alive) {
-                    let (view, place) = (&views[lane], tops[lane].place);
+                    let (view, place) = (&views[lane], places[lane]);
                     let all = lid_bounds(simd, cutter, view, place, &node.lids);
                     high |= all.simd_ge(heights[lane]).to_bitmask();
                     bounds[lane] = *all;
@@ -196,38 +198,11 @@ impl<L: Leaf> Tree<L> {
     }
 }
 
-/// What is known before a search.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Start {
-    /// Where part and cutter stand.
-    pub pose: Pose,
-    /// A height that some candidate exceeds, mm, or minus infinity.
-    pub floor: f64,
-    /// `(d, z)` of the place on the cutter that is likely to touch.
-    pub place: [f64; 2],
-}
-
-/// What the best candidate so far rules out.
-#[derive(Debug, Clone, Copy)]
-struct Top<C> {
-    /// Not above its height, and never below everything.
-    height: f32,
-    /// `(d, z)` of its place on the cutter, and what leaves make of it.
-    place: [f32; 2],
-    ceiling: C,
-}
-
-impl<C> Top<C> {
-    /// Of a candidate of this height that is touched at the place that `start` names.
-    #[inline(always)]
-    fn new<L: Leaf<Ceiling = C>>(cutter: &Cutter, start: &Start, height: f64) -> Self {
-        let low = height as f32 - height.abs() as f32 * f32::EPSILON;
-        Self {
-            height: low.max(f32::MIN),
-            place: [start.place[0] as f32, start.place[1] as f32],
-            ceiling: L::ceiling(cutter, &start.pose, start.place),
-        }
-    }
+/// In single precision not above a height, and never below everything.
+#[inline(always)]
+fn under(height: f64) -> f32 {
+    let low = height as f32 - height.abs() as f32 * f32::EPSILON;
+    low.max(f32::MIN)
 }
 
 /// The children still to be looked at, each with its bound for every position.
