@@ -111,8 +111,8 @@ pub(crate) trait Leaf: Sync + Send {
     /// Raises the best of each position that is `alive` to the highest candidate, and its ceiling with it.
     /// Returns how many candidates were evaluated, and the positions that were raised.
     ///
-    /// Positions do one thing after the other, and all of them the same thing one after the other: none waits for
-    /// another, nor for what nothing predicts, such as which candidates are ahead.
+    /// Each step is taken for all positions before the next one: what one of them computes does not wait for
+    /// another's branches, which nothing predicts.
     fn search<S: Set>(
         &self,
         simd: S,

@@ -25,7 +25,9 @@ pub(super) struct Effort {
 impl Effort {
     /// A few minutes.
     pub const FULL: Self = Self {
-        densities: &[1.0e4, 1.9e4, 3.16e4, 1.0e5, 3.16e5, 1.0e6, 1.8e6, 3.16e6, 1.0e7],
+        densities: &[
+            1.0e4, 1.9e4, 3.16e4, 1.0e5, 3.16e5, 1.0e6, 1.8e6, 3.16e6, 1.0e7,
+        ],
         positions: 100_000,
         turns: 3,
         patience: Duration::from_millis(1000),
