@@ -156,12 +156,6 @@ fn turn<S: Simd>([x, y, z]: Eight<S>, cos: f32, sin: f32, by: [f32; 3]) -> Eight
     ]
 }
 
-/// `a + s·b`.
-#[inline(always)]
-fn add3<S: Simd>(a: Eight<S>, s: f32x8<S>, b: Eight<S>) -> Eight<S> {
-    [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -136,21 +136,19 @@ impl<L: Leaf> Tree<L> {
             return;
         };
         let mut views = [View::new(&self.frame, cutter, &middle.pose); LANES];
-        let place = |start: &Start| start.place.map(|c| c as f32);
-        let ceiling = |start: &Start| L::ceiling(cutter, &start.pose, start.place);
-        let mut places = [place(middle); LANES];
+        let mut places = [single(middle.place); LANES];
         let mut batch = Batch {
             cutter,
             starts,
             best,
-            ceilings: [ceiling(middle); LANES],
+            ceilings: [L::ceiling(cutter, &middle.pose, middle.place); LANES],
         };
         let mut heights = [f32::INFINITY; LANES];
         for lane in lanes(active) {
             let start = &starts[lane];
             views[lane] = View::new(&self.frame, cutter, &start.pose);
-            places[lane] = place(start);
-            batch.ceilings[lane] = ceiling(start);
+            places[lane] = single(start.place);
+            batch.ceilings[lane] = L::ceiling(cutter, &start.pose, start.place);
             heights[lane] = under(batch.best[lane].height);
         }
         let swing = Swing::new(&middle.pose, starts.iter().map(|start| start.pose));
@@ -166,7 +164,7 @@ impl<L: Leaf> Tree<L> {
                 for lane in lanes(raised) {
                     let best = &batch.best[lane];
                     let [d, _, z] = starts[lane].pose.face(best.contact);
-                    places[lane] = [d as f32, z as f32];
+                    places[lane] = single([d, z]);
                     heights[lane] = under(best.height);
                 }
                 continue;
@@ -196,6 +194,12 @@ impl<L: Leaf> Tree<L> {
             open.push_all(simd, &bounds, high, &heights, &node.children);
         }
     }
+}
+
+/// A place on the cutter in single precision.
+#[inline(always)]
+fn single([d, z]: [f64; 2]) -> [f32; 2] {
+    [d as f32, z as f32]
 }
 
 /// In single precision not above a height, and never below everything.

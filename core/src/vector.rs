@@ -14,9 +14,13 @@ pub fn sub<T: Copy + Sub<Output = T>>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// `a + s·b`.
+/// `a + s·b`, of points or of several side by side.
 #[inline(always)]
-pub fn add_scaled(a: Point, s: f64, b: Point) -> Point {
+pub fn add_scaled<T: Copy + Add<Output = T> + Mul<Output = T>>(
+    a: [T; 3],
+    s: T,
+    b: [T; 3],
+) -> [T; 3] {
     [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
 }
 

@@ -2,12 +2,12 @@
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-use super::{Plane, Slopes, add3, turn};
+use super::{Plane, Slopes, turn};
 use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::supports;
 use crate::tolerance::BOUND_SLACK;
-use crate::vector::{Point, dot, length, sub};
+use crate::vector::{Point, add_scaled, cross, dot, length, sub};
 
 /// Facets that lie together as their bounds see them: from a middle on, and heights from a base on.
 #[derive(Debug, Clone, Copy, Default)]
@@ -81,11 +81,7 @@ pub(crate) fn facet_bounds<S: Simd>(
     let b = turn(corners[1], near.cos, near.sin, near.middle);
     let c = turn(corners[2], near.cos, near.sin, near.middle);
     let (ab, ac) = (sub(b, a), sub(c, a));
-    let n = [
-        ab[1] * ac[2] - ab[2] * ac[1],
-        ab[2] * ac[0] - ab[0] * ac[2],
-        ab[0] * ac[1] - ab[1] * ac[0],
-    ];
+    let n = cross(ab, ac);
     let down = n[1].simd_lt(0.0);
     let up = [
         down.select(-n[0], n[0]),
@@ -102,7 +98,7 @@ pub(crate) fn facet_bounds<S: Simd>(
     let excess = (s + t - one).max(0.0) * 0.5;
     let s = (s - excess).max(0.0).min(one);
     let t = (t - excess).max(0.0).min(one);
-    let start = add3(add3(a, s, ab), t, ac);
+    let start = add_scaled(add_scaled(a, s, ab), t, ac);
 
     let first = Slopes::at(simd, cutter, start);
     let (over_a, over_b, over_c) = (first.over(a), first.over(b), first.over(c));
@@ -123,7 +119,7 @@ pub(crate) fn facet_bounds<S: Simd>(
         .simd_ge(0.0)
         .select(share, f32x8::splat(simd, 0.0))
         .min(one);
-    let second = Slopes::at(simd, cutter, add3(start, share, way));
+    let second = Slopes::at(simd, cutter, add_scaled(start, share, way));
 
     let first = over_ab.max(over_c) + first.steep() * near.rounding;
     let over = second.over(a).max(second.over(b)).max(second.over(c));

@@ -66,6 +66,16 @@ impl FacetLeaf {
         leaf
     }
 
+    /// The corners of all of them, as the bounds see them.
+    #[inline(always)]
+    fn corners_near<S: Set>(&self, simd: S) -> [[f32x8<S>; 3]; 3] {
+        [
+            load(simd, &self.near[0]),
+            load(simd, &self.near[1]),
+            load(simd, &self.near[2]),
+        ]
+    }
+
     /// Raises `best` to the facet in a slot; returns whether that did.
     #[inline(never)]
     fn solve(
@@ -172,11 +182,7 @@ impl Leaf for FacetLeaf {
         alive: Lanes,
     ) -> (u64, Lanes) {
         let cutter = batch.cutter;
-        let corners = [
-            load(simd, &self.near[0]),
-            load(simd, &self.near[1]),
-            load(simd, &self.near[2]),
-        ];
+        let corners = self.corners_near(simd);
         let mut nears = [Near::default(); LANES];
         let mut open = [0; LANES];
         let mut some = 0;
@@ -361,11 +367,7 @@ mod tests {
             let ceiling = Plane::at(&cutter, &pose, [d, z]);
             best.id = 7;
             let open = with_simd!(level.token(), simd => {
-                let corners = [
-                    load(simd, &leaf.near[0]),
-                    load(simd, &leaf.near[1]),
-                    load(simd, &leaf.near[2]),
-                ];
+                let corners = leaf.corners_near(simd);
                 leaf.open(simd, &pose, &near, &ceiling, &corners, &mut best)
             });
             assert_eq!((open, best.id), (0, 0), "{level}");
