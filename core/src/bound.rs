@@ -20,7 +20,7 @@ use crate::tolerance::WELL_WITHIN;
 use crate::vector::Point;
 
 pub(crate) use facet::{Near, facet_bounds};
-pub(crate) use lid::{Frame, Lids, Swing, View, lid_bounds, swung_lid_bounds};
+pub(crate) use lid::{Frame, Lids, Swing, View, lid_bounds};
 
 /// A plane that F nowhere exceeds, as a linear function of the part's points.
 #[derive(Debug, Clone, Copy)]
@@ -159,6 +159,7 @@ fn turn<S: Simd>([x, y, z]: Eight<S>, cos: f32, sin: f32, by: [f32; 3]) -> Eight
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     pub(super) fn cutter(which: usize) -> Cutter {
         let cutters = [
@@ -176,6 +177,31 @@ mod tests {
             x,
             cos: libm::cos(angle),
             sin: libm::sin(angle),
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        #[test]
+        fn a_cutter_bends_away_from_its_tangent_planes(
+            places in prop::array::uniform2(prop::array::uniform2(-1.0..1.0_f64)),
+            which in 0..4_usize,
+        ) {
+            let cutter = cutter(which);
+            let [from, to] = places.map(|[d, z]| {
+                let d = d * cutter.half_width();
+                let m = cutter.profile(d).expect("within the width");
+                (d, z * m, m)
+            });
+            let t = Tangent::near(&cutter, from.0, from.1);
+            let (off_d, off_z) = (to.0 - t.d, to.1 - t.z);
+            let plane = t.rise + t.by_d * off_d + t.by_z * off_z;
+            let [by_d, by_z] = cutter.least_bends();
+            let below = (by_d * off_d * off_d + by_z * off_z * off_z) / 2.0;
+            let (_, z, m) = to;
+            let rise = ((m - z) * (m + z)).sqrt();
+            prop_assert!(rise <= plane - below + 1.0e-9, "{rise} over {plane} - {below}");
         }
     }
 }

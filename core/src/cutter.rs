@@ -156,17 +156,17 @@ impl Cutter {
         }
     }
 
-    /// How much the height over a wheel's axis bends down across it, everywhere and at least, 1/mm: along
-    /// any way over the profile it lies below its tangent by half of this times the square of the way's
-    /// part across the axis.
-    pub fn least_bend(&self) -> f64 {
+    /// How much the height over a wheel's axis bends down everywhere, and at least, along the axis and across it,
+    /// 1/mm: along any way over the profile it lies below its tangent by half of these times the squares of the
+    /// way's parts.
+    pub fn least_bends(&self) -> [f64; 2] {
         match *self {
-            // Along a way (x, y), G = √(m² − z²) bends by (m|m″|/G)·x² + (m′z·x − m·y)²/G³, which is least, over
-            // all x, with m³|m″|·y² / (G·(m|m″|G² + m′²z²)). Since m|m″| ≥ r²/(r² − d²) ≥ m′² that is y²/G or
-            // more, and G is at most R + r.
-            Self::Torus { .. } => 1.0 / self.max_radius(),
+            // Along a way (x, y), G = √(m² − z²) bends by (m|m″|/G)·x² + (m′z·x − m·y)²/G³, with
+            // m|m″| = (1 + R/√(r² − d²))·(1 + m′²). Of a ball, without R, that is (x² + y²)/G and
+            // (m′m·x − z·y)²/G³ more. What R adds is at least R/(r·G)·x², and G is at most R + r.
+            Self::Torus { minor_radius, .. } => [1.0 / minor_radius, 1.0 / self.max_radius()],
             // Level along its rulings.
-            Self::Cone { .. } => 0.0,
+            Self::Cone { .. } => [0.0; 2],
         }
     }
 

@@ -10,7 +10,7 @@ use fearless_simd::{Simd, f32x8, prelude::*};
 use rayon::prelude::*;
 
 use crate::blocks::{Block, longest_side};
-use crate::bound::{Frame, Lids, Swing, View, lid_bounds, swung_lid_bounds};
+use crate::bound::{Frame, Lids, Swing, View, lid_bounds};
 use crate::cutter::Cutter;
 use crate::lanes::{LANES, Lanes, lanes};
 use crate::leaf::{Batch, Best, Leaf, Start};
@@ -130,28 +130,24 @@ impl<L: Leaf> Tree<L> {
         best: &mut [Best; LANES],
         counters: &mut Counters,
     ) {
-        // The others are closest to the one in the middle.
-        let from = starts.len() / 2;
-        let Some(middle) = starts.get(from).filter(|_| !self.nodes.is_empty()) else {
+        let Some(first) = starts.first().filter(|_| !self.nodes.is_empty()) else {
             return;
         };
-        let mut views = [View::new(&self.frame, cutter, &middle.pose); LANES];
-        let mut places = [single(middle.place); LANES];
+        let mut views = [View::new(&self.frame, cutter, &first.pose, first.place); LANES];
         let mut batch = Batch {
             cutter,
             starts,
             best,
-            ceilings: [L::ceiling(cutter, &middle.pose, middle.place); LANES],
+            ceilings: [L::ceiling(cutter, &first.pose, first.place); LANES],
         };
         let mut heights = [f32::INFINITY; LANES];
         for lane in lanes(active) {
             let start = &starts[lane];
-            views[lane] = View::new(&self.frame, cutter, &start.pose);
-            places[lane] = single(start.place);
+            views[lane] = View::new(&self.frame, cutter, &start.pose, start.place);
             batch.ceilings[lane] = L::ceiling(cutter, &start.pose, start.place);
             heights[lane] = under(batch.best[lane].height);
         }
-        let swing = Swing::new(&middle.pose, starts.iter().map(|start| start.pose));
+        let swing = Swing::new(starts.iter().map(|start| start.pose));
         let mut open = Stack::new();
         open.push([f32::INFINITY; LANES], INNER);
         // Equal heights are still looked at: a lower number may be among them.
@@ -164,7 +160,7 @@ impl<L: Leaf> Tree<L> {
                 for lane in lanes(raised) {
                     let best = &batch.best[lane];
                     let [d, _, z] = starts[lane].pose.face(best.contact);
-                    places[lane] = single([d, z]);
+                    views[lane].expect([d, z]);
                     heights[lane] = under(best.height);
                 }
                 continue;
@@ -172,34 +168,15 @@ impl<L: Leaf> Tree<L> {
             let node = &self.nodes[(child ^ INNER) as usize];
             let mut bounds = [[f32::NEG_INFINITY; LANES]; LANES];
             let mut high = 0;
-            let over_nodes = node.children[0] & INNER != 0;
-            if over_nodes && alive.count_ones() > 1 {
-                // What one position's view loses for the others is little beside a large lid's slack.
-                counters.nodes += 1;
-                let place = places[from];
-                let all = swung_lid_bounds(simd, cutter, &views, from, &swing, place, &node.lids);
-                for lane in lanes(alive) {
-                    high |= all[lane].simd_ge(heights[lane]).to_bitmask();
-                    bounds[lane] = *all[lane];
-                }
-            } else {
-                counters.nodes += u64::from(alive.count_ones());
-                for lane in lanes(alive) {
-                    let (view, place) = (&views[lane], places[lane]);
-                    let all = lid_bounds(simd, cutter, view, place, &node.lids);
-                    high |= all.simd_ge(heights[lane]).to_bitmask();
-                    bounds[lane] = *all;
-                }
+            counters.nodes += 1;
+            let all = lid_bounds(simd, cutter, &views, alive, swing, &node.lids);
+            for lane in lanes(alive) {
+                high |= all[lane].simd_ge(heights[lane]).to_bitmask();
+                bounds[lane] = *all[lane];
             }
             open.push_all(simd, &bounds, high, &heights, &node.children);
         }
     }
-}
-
-/// A place on the cutter in single precision.
-#[inline(always)]
-fn single([d, z]: [f64; 2]) -> [f32; 2] {
-    [d as f32, z as f32]
 }
 
 /// In single precision not above a height, and never below everything.
