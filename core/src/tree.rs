@@ -148,6 +148,7 @@ impl<L: Leaf> Tree<L> {
             heights[lane] = under(batch.best[lane].height);
         }
         let swing = Swing::new(starts.iter().map(|start| start.pose));
+        let close = swing.is_close(&self.frame, cutter);
         let mut open = Stack::new();
         open.push([f32::INFINITY; LANES], INNER);
         // Equal heights are still looked at: a lower number may be among them.
@@ -168,11 +169,21 @@ impl<L: Leaf> Tree<L> {
             let node = &self.nodes[(child ^ INNER) as usize];
             let mut bounds = [[f32::NEG_INFINITY; LANES]; LANES];
             let mut high = 0;
-            counters.nodes += 1;
-            let all = lid_bounds(simd, cutter, &views, alive, swing, &node.lids);
-            for lane in lanes(alive) {
-                high |= all[lane].simd_ge(heights[lane]).to_bitmask();
-                bounds[lane] = *all[lane];
+            // What one position's planes lose for others is little beside a large lid's slack.
+            let shared = close || node.children[0] & INNER != 0;
+            let mut left = alive;
+            while left != 0 {
+                let (some, swing) = match shared {
+                    true => (left, swing),
+                    false => (left & left.wrapping_neg(), Swing::NONE),
+                };
+                left &= !some;
+                counters.nodes += 1;
+                let all = lid_bounds(simd, cutter, &views, some, swing, &node.lids);
+                for lane in lanes(some) {
+                    high |= all[lane].simd_ge(heights[lane]).to_bitmask();
+                    bounds[lane] = *all[lane];
+                }
             }
             open.push_all(simd, &bounds, high, &heights, &node.children);
         }

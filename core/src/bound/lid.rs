@@ -19,6 +19,8 @@ pub(crate) struct Frame {
     origin: f64,
     /// Largest magnitude of a coordinate counted from there, mm.
     size: f64,
+    /// Largest distance from the spindle, mm.
+    across: f64,
 }
 
 impl Frame {
@@ -27,6 +29,7 @@ impl Frame {
         Self {
             origin: (x.low + x.high) / 2.0,
             size: across.max((x.high - x.low) / 2.0),
+            across,
         }
     }
 }
@@ -187,7 +190,17 @@ pub(crate) struct Swing {
     travel: f32,
 }
 
+/// How far small lids may move between positions that share their bounds, as a share of the cutter's radii: beyond
+/// that one's planes lose more for the others than sharing them saves.
+const CLOSE: f64 = 0.5;
+
 impl Swing {
+    /// Of a single position.
+    pub const NONE: Self = Self {
+        chord: 0.0,
+        travel: 0.0,
+    };
+
     /// Of some positions.
     #[inline(always)]
     pub fn new(poses: impl Iterator<Item = Pose>) -> Self {
@@ -204,6 +217,16 @@ impl Swing {
             chord: 2.0 * chord.sqrt() as f32,
             travel: 2.0 * travel as f32,
         }
+    }
+
+    /// Whether positions are close enough for the cutter to share the bounds of small lids.
+    #[inline(always)]
+    pub fn is_close(self, frame: &Frame, cutter: &Cutter) -> bool {
+        let [along, across] = cutter.least_bends();
+        let moved = f64::from(self.travel) * along;
+        let turned = f64::from(self.chord) * frame.across * across;
+        // A cutter that does not bend leaves one's planes where they are for all.
+        across > 0.0 && moved.max(turned) < CLOSE
     }
 }
 
@@ -258,12 +281,12 @@ impl<S: Simd> Under<S> {
     /// falls, and they with it.
     #[inline(always)]
     fn new(simd: S, cutter: &Cutter, view: &View, swing: Swing, lids: &Lids) -> Self {
+        let [d, y, z] = view.see(simd, lids);
         let u = load(simd, &lids.u);
         let vy = f32x8::from_slice(simd, &lids.v[0]);
         let vz = f32x8::from_slice(simd, &lids.v[1]);
         let below = f32x8::from_slice(simd, &lids.below);
         let normal = f32x8::from_slice(simd, &lids.normal[0]);
-        let [d, y, z] = view.see(simd, lids);
         let half_d = u[0].abs();
         let half_z =
             (u[1] * view.sin + u[2] * view.cos).abs() + (vy * view.sin + vz * view.cos).abs();
