@@ -147,8 +147,8 @@ impl<L: Leaf> Tree<L> {
             batch.ceilings[lane] = L::ceiling(cutter, &start.pose, start.place);
             heights[lane] = under(batch.best[lane].height);
         }
-        let swing = Swing::new(starts.iter().map(|start| start.pose));
-        let close = swing.is_close(&self.frame, cutter);
+        let swing = Swing::new(cutter, starts.iter().map(|start| start.pose));
+        let close = swing.is_close(&self.frame);
         let mut open = Stack::new();
         open.push([f32::INFINITY; LANES], INNER);
         // Equal heights are still looked at: a lower number may be among them.
@@ -175,7 +175,7 @@ impl<L: Leaf> Tree<L> {
             while left != 0 {
                 let (some, swing) = match shared {
                     true => (left, swing),
-                    false => (left & left.wrapping_neg(), Swing::NONE),
+                    false => (left & left.wrapping_neg(), swing.alone()),
                 };
                 left &= !some;
                 counters.nodes += 1;

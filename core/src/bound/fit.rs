@@ -51,7 +51,7 @@ impl Shape {
             size[k] = points.iter().map(far).fold(0.0, f64::max);
             inverse[k] = if size[k] > 0.0 { 1.0 / size[k] } else { 0.0 };
         }
-        let [_, ss, tt, st] = paraboloid(points.iter().map(|&p| {
+        let [ss, tt, st] = paraboloid(points.iter().map(|&p| {
             let [x, y, w] = axes.map(|axis| dot(sub(p, mean), axis));
             [x * inverse[0], y * inverse[1], w]
         }));
@@ -71,8 +71,8 @@ impl Shape {
     }
 }
 
-/// What 1, s², t² and st have to be multiplied by to fit points `(s, t, w)` best.
-fn paraboloid(points: impl Iterator<Item = Point>) -> [f64; 4] {
+/// What s², t² and st have to be multiplied by, beside a constant, to fit points `(s, t, w)` best.
+fn paraboloid(points: impl Iterator<Item = Point>) -> [f64; 3] {
     let (mut count, mut sums, mut right) = (0.0, [0.0; 8], [0.0; 4]);
     for [s, t, w] in points {
         let (ss, tt, st) = (s * s, t * t, s * t);
@@ -99,7 +99,8 @@ fn paraboloid(points: impl Iterator<Item = Point>) -> [f64; 4] {
         .try_inverse()
         .map(|inverse| inverse * Vector4::from(right));
     let fit = fit.filter(|fit| fit.iter().all(|c| c.is_finite()));
-    fit.unwrap_or_else(Vector4::zeros).into()
+    let fit = fit.unwrap_or_else(Vector4::zeros);
+    [fit[1], fit[2], fit[3]]
 }
 
 /// The middle of points, and the normal of the plane that fits them, away from the spindle.
@@ -127,7 +128,7 @@ fn plane(points: &[Point]) -> (Point, Point) {
     (mean, if outward { normal } else { normal.map(|c| -c) })
 }
 
-/// A normal, and two axes square to it: one that leans towards the spindle, and one square to the spindle.
+/// Axes around a normal, which is the last: one that leans towards the spindle, and one square to the spindle.
 fn around(normal: Point) -> [Point; 3] {
     let x = [1.0, 0.0, 0.0];
     let u = unit(add_scaled(x, -normal[0], normal)).unwrap_or([0.0, 1.0, 0.0]);

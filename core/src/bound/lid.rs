@@ -181,29 +181,25 @@ impl View {
     }
 }
 
-/// How far positions are from each other, at most.
+/// How far positions are from each other, at most, and how their cutter bends between them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Swing {
     /// The longest chord of the angles between them.
     chord: f32,
     /// The longest travel, mm.
     travel: f32,
+    /// [`Cutter::least_bends`], which is asked once for all lids.
+    bends: [f32; 2],
 }
 
 /// How far small lids may move between positions that share their bounds, as a share of the cutter's radii: beyond
 /// that one's planes lose more for the others than sharing them saves.
-const CLOSE: f64 = 0.5;
+const CLOSE: f32 = 0.5;
 
 impl Swing {
-    /// Of a single position.
-    pub const NONE: Self = Self {
-        chord: 0.0,
-        travel: 0.0,
-    };
-
     /// Of some positions.
     #[inline(always)]
-    pub fn new(poses: impl Iterator<Item = Pose>) -> Self {
+    pub fn new(cutter: &Cutter, poses: impl Iterator<Item = Pose>) -> Self {
         let [mut chord, mut travel] = [0.0_f64; 2];
         let mut first = None;
         for pose in poses {
@@ -216,15 +212,26 @@ impl Swing {
         Self {
             chord: 2.0 * chord.sqrt() as f32,
             travel: 2.0 * travel as f32,
+            bends: cutter.least_bends().map(|b| b as f32),
+        }
+    }
+
+    /// Of one of them by itself.
+    #[inline(always)]
+    pub fn alone(self) -> Self {
+        Self {
+            chord: 0.0,
+            travel: 0.0,
+            ..self
         }
     }
 
     /// Whether positions are close enough for the cutter to share the bounds of small lids.
     #[inline(always)]
-    pub fn is_close(self, frame: &Frame, cutter: &Cutter) -> bool {
-        let [along, across] = cutter.least_bends();
-        let moved = f64::from(self.travel) * along;
-        let turned = f64::from(self.chord) * frame.across * across;
+    pub fn is_close(self, frame: &Frame) -> bool {
+        let [along, across] = self.bends;
+        let moved = self.travel * along;
+        let turned = self.chord * frame.across as f32 * across;
         // A cutter that does not bend leaves one's planes where they are for all.
         across > 0.0 && moved.max(turned) < CLOSE
     }
@@ -292,7 +299,7 @@ impl<S: Simd> Under<S> {
             (u[1] * view.sin + u[2] * view.cos).abs() + (vy * view.sin + vz * view.cos).abs();
         let near_d = (d - half_d).max(view.place[0]).min(d + half_d);
         let near_z = (z - half_z).max(view.place[1]).min(z + half_z);
-        let bends = cutter.least_bends().map(|b| b as f32);
+        let bends = swing.bends;
 
         let radius = f32x8::from_slice(simd, &lids.radius) + (y.abs() + z.abs()) * swing.chord;
         let along = f32x8::from_slice(simd, &lids.along) + (swing.travel + view.rounding);
@@ -463,7 +470,7 @@ mod tests {
         let (_, frame, held) = under_a_lid(&points, 1.0, 0.0);
         let cutter = cutter(0);
         let views = [View::new(&frame, &cutter, &pose(0.0, 0.0), [0.0; 2]); LANES];
-        let swing = Swing::new(std::iter::empty());
+        let swing = Swing::new(&cutter, std::iter::empty());
         let most = 30.0 + cutter.max_radius();
         for level in Level::available() {
             let all =
@@ -498,12 +505,15 @@ mod tests {
             });
             let (points, frame, held) = under_a_lid(&points, shrink, far);
             let views = std::array::from_fn(|k| View::new(&frame, &cutter, &poses[k], places[k]));
-            let swing = Swing::new(poses.into_iter());
+            let swing = Swing::new(&cutter, poses.into_iter());
             for level in Level::available() {
                 let all = with_simd!(level.token(), simd => bounds(simd, &cutter, &views, some, swing, &held));
                 for lane in lanes(some) {
-                    let (pose, bounds) = (&poses[lane], all[lane]);
-                    let bound = f64::from(bounds[3]);
+                    let pose = &poses[lane];
+                    let alone = with_simd!(level.token(), simd => {
+                        bounds(simd, &cutter, &views, 1 << lane, swing.alone(), &held)
+                    });
+                    let bound = f64::from(all[lane][3].min(alone[lane][3]));
                     for &p in &points {
                         if let Some(touch) = touch_point(&cutter, pose, p) {
                             prop_assert!(bound >= touch.height, "{level}");
@@ -515,7 +525,7 @@ mod tests {
                             prop_assert!(bound >= touch.height, "{level}, a facet");
                         }
                     }
-                    prop_assert_eq!(bounds[2], f32::NEG_INFINITY, "nothing is there");
+                    prop_assert_eq!(all[lane][2], f32::NEG_INFINITY, "nothing is there");
                 }
             }
         }
