@@ -115,10 +115,14 @@ impl<S: Simd> Slopes<S> {
         }
     }
 
-    /// F's upper bound at a point seen from the cutter.
+    /// F's upper bounds at points seen from the cutter.
     #[inline(always)]
-    fn over(&self, p: [f32x8<S>; 3]) -> f32x8<S> {
-        p[1] + self.rise + self.by_d * (p[0] - self.d) + self.by_z * (p[2] - self.z)
+    fn over(&self, points: [Eight<S>; 3]) -> [f32x8<S>; 3] {
+        let start = (-self.by_d).mul_add(self.d, (-self.by_z).mul_add(self.z, self.rise));
+        points.map(
+            #[inline(always)]
+            |[d, y, z]| self.by_d.mul_add(d, self.by_z.mul_add(z, y + start)),
+        )
     }
 
     /// The plane's slopes together, the attack axis's own included.
@@ -130,7 +134,7 @@ impl<S: Simd> Slopes<S> {
     /// F's slope along a way.
     #[inline(always)]
     fn along(&self, way: [f32x8<S>; 3]) -> f32x8<S> {
-        way[1] + self.by_d * way[0] + self.by_z * way[2]
+        self.by_d.mul_add(way[0], self.by_z.mul_add(way[2], way[1]))
     }
 }
 
@@ -146,13 +150,38 @@ pub(crate) fn load<S: Simd>(simd: S, axes: &[[f32; LANES]; 3]) -> Eight<S> {
     ]
 }
 
+// Products and sums in one step where there is an instruction for it: it does not matter how a bound is rounded.
+
+#[inline(always)]
+fn dot<S: Simd>(a: Eight<S>, b: Eight<S>) -> f32x8<S> {
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
+}
+
+#[inline(always)]
+fn cross<S: Simd>(a: Eight<S>, b: Eight<S>) -> Eight<S> {
+    [
+        a[1].mul_sub(b[2], a[2] * b[1]),
+        a[2].mul_sub(b[0], a[0] * b[2]),
+        a[0].mul_sub(b[1], a[1] * b[0]),
+    ]
+}
+
+#[inline(always)]
+fn add_scaled<S: Simd>(a: Eight<S>, s: f32x8<S>, b: Eight<S>) -> Eight<S> {
+    [
+        s.mul_add(b[0], a[0]),
+        s.mul_add(b[1], a[1]),
+        s.mul_add(b[2], a[2]),
+    ]
+}
+
 /// Turned about the spindle, then moved.
 #[inline(always)]
 fn turn<S: Simd>([x, y, z]: Eight<S>, cos: f32, sin: f32, by: [f32; 3]) -> Eight<S> {
     [
         x + by[0],
-        y * cos - z * sin + by[1],
-        y * sin + z * cos + by[2],
+        y.mul_add(cos, z.mul_add(-sin, f32x8::splat(y.simd, by[1]))),
+        y.mul_add(sin, z.mul_add(cos, f32x8::splat(y.simd, by[2]))),
     ]
 }
 

@@ -80,13 +80,13 @@ pub(crate) fn supports<S: Simd>(
     cutter: &Cutter,
     [x, y, z]: [f32x8<S>; 3],
 ) -> (f32x8<S>, f32x8<S>) {
-    let across = y * y + z * z;
+    let across = y.mul_add(y, z * z);
     match *cutter {
         Cutter::Torus {
             major_radius,
             minor_radius,
         } => {
-            let share = f32x8::splat(simd, minor_radius as f32) / (x * x + across).sqrt();
+            let share = f32x8::splat(simd, minor_radius as f32) / x.mul_add(x, across).sqrt();
             let disc = f32x8::splat(simd, major_radius as f32) / across.sqrt();
             (-(share * x), -((share + disc) * z))
         }

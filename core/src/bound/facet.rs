@@ -2,12 +2,12 @@
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-use super::{Plane, Slopes, turn};
+use super::{Plane, Slopes, add_scaled, cross, turn};
 use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::supports;
 use crate::tolerance::BOUND_SLACK;
-use crate::vector::{Point, add_scaled, cross, dot, length, sub};
+use crate::vector::{Point, dot, length, sub};
 
 /// Facets that lie together as their bounds see them: from a middle on, and heights from a base on.
 #[derive(Debug, Clone, Copy, Default)]
@@ -63,7 +63,8 @@ impl Roof {
     #[inline(always)]
     pub fn over<S: Simd>(&self, _: S, corner: [f32x8<S>; 3]) -> f32x8<S> {
         let [a, b, c] = self.slope;
-        corner[0] * a + corner[1] * b + corner[2] * c + self.height
+        let [x, y, z] = corner;
+        x.mul_add(a, y.mul_add(b, z.mul_add(c, self.height)))
     }
 }
 
@@ -93,15 +94,15 @@ pub(crate) fn facet_bounds<S: Simd>(
     let (d, z) = (d - a[0], z - a[2]);
     let one = f32x8::splat(simd, 1.0);
     let tilt = one / n[1];
-    let s = weight(simd, (z * ac[0] - d * ac[2]) * tilt);
-    let t = weight(simd, (d * ab[2] - z * ab[0]) * tilt);
+    let s = weight(simd, z.mul_sub(ac[0], d * ac[2]) * tilt);
+    let t = weight(simd, d.mul_sub(ab[2], z * ab[0]) * tilt);
     let excess = (s + t - one).max(0.0) * 0.5;
     let s = (s - excess).max(0.0).min(one);
     let t = (t - excess).max(0.0).min(one);
     let start = add_scaled(add_scaled(a, s, ab), t, ac);
 
     let first = Slopes::at(simd, cutter, start);
-    let (over_a, over_b, over_c) = (first.over(a), first.over(b), first.over(c));
+    let [over_a, over_b, over_c] = first.over([a, b, c]);
     let over_ab = over_a.max(over_b);
     let b_wins = over_b.simd_gt(over_a);
     let c_wins = over_c.simd_gt(over_ab);
@@ -121,9 +122,10 @@ pub(crate) fn facet_bounds<S: Simd>(
         .min(one);
     let second = Slopes::at(simd, cutter, add_scaled(start, share, way));
 
-    let first = over_ab.max(over_c) + first.steep() * near.rounding;
-    let over = second.over(a).max(second.over(b)).max(second.over(c));
-    let second = over + second.steep() * near.rounding;
+    let first = first.steep().mul_add(near.rounding, over_ab.max(over_c));
+    let [over_a, over_b, over_c] = second.over([a, b, c]);
+    let over = over_a.max(over_b).max(over_c);
+    let second = second.steep().mul_add(near.rounding, over);
     let w = cutter.half_width() as f32 + near.rounding;
     let low = a[0].min(b[0]).min(c[0]);
     let high = a[0].max(b[0]).max(c[0]);

@@ -4,13 +4,13 @@
 use fearless_simd::{Simd, f32x8, f64x8, mask32x8, prelude::*};
 
 use super::fit::{Shape, few};
-use super::{Eight, Slopes, load, turn};
+use super::{Eight, Slopes, dot, load, turn};
 use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::{LANES, Lanes, lanes};
 use crate::simd::Set;
 use crate::slices::{Axes, eight, eights};
-use crate::vector::{Interval, Point, add_scaled, dot, length};
+use crate::vector::{Interval, Point, add_scaled, length};
 
 /// Where the lids of a tree are: what rounding has to be measured by.
 #[derive(Debug, Clone, Copy)]
@@ -331,12 +331,12 @@ impl<S: Simd> Under<S> {
             by_z: self.slopes.by_z - fall_z,
             ..self.slopes
         };
-        let away_d = (plane.by_d + fall_d * 0.5) * off_d;
-        let away_z = plane.by_z * (z - self.slopes.z) + fall_z * off_z * 0.5;
+        let away_d = off_d * fall_d.mul_add(0.5, plane.by_d);
+        let away_z = (off_z * 0.5).mul_add(fall_z, plane.by_z * (z - self.slopes.z));
         let over = plane.rise_over(simd, view, lids, self.bend) + self.loose;
-        let lost = plane.steep() * view.rounding
-            + (away_d.abs() + away_z.abs() + over.abs()) * (8.0 * f32::EPSILON);
-        let bound = y + plane.rise + away_d + away_z + over + lost;
+        let size = away_d.abs() + away_z.abs() + over.abs();
+        let lost = size.mul_add(8.0 * f32::EPSILON, plane.steep() * view.rounding);
+        let bound = (y + plane.rise) + (away_d + away_z) + (over + lost);
         let nothing = f32x8::splat(simd, f32::NEG_INFINITY);
         self.near.select(bound.min(self.circle), nothing)
     }
@@ -363,16 +363,20 @@ impl<S: Simd> Slopes<S> {
         let above = f32x8::from_slice(simd, &lids.above);
         let below = f32x8::from_slice(simd, &lids.below);
         // Turned back into the part's frame, the plane's slopes tell how far it rises under a lid.
+        let cos = f32x8::splat(simd, view.cos);
         let slope = [
             self.by_d,
-            self.by_z * view.sin + view.cos,
+            self.by_z.mul_add(view.sin, cos),
             self.by_z * view.cos - view.sin,
         ];
         let by_w = dot(slope, normal);
         let outward = by_w.max(0.0);
         let by_u = dot(slope, u).abs();
-        let by_v = (slope[1] * vy + slope[2] * vz).abs();
-        let along_u = rise(by_u, outward * f32x8::from_slice(simd, &lids.a) + bend);
+        let by_v = slope[1].mul_add(vy, slope[2] * vz).abs();
+        let along_u = rise(
+            by_u,
+            outward.mul_add(f32x8::from_slice(simd, &lids.a), bend),
+        );
         let along_v = rise(by_v, outward * f32x8::from_slice(simd, &lids.b));
         along_u + along_v + (by_w * above).max(-by_w * below)
     }
@@ -382,7 +386,7 @@ impl<S: Simd> Slopes<S> {
 #[inline(always)]
 fn rise<S: Simd>(by: f32x8<S>, bend: f32x8<S>) -> f32x8<S> {
     let s = (by / (bend + bend).max(1.0e-30)).min(1.0);
-    s * (by - bend * s)
+    s * (-bend).mul_add(s, by)
 }
 
 #[cfg(test)]
