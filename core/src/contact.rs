@@ -268,10 +268,16 @@ mod tests {
             corners in prop::array::uniform3(points()),
         ) {
             let touch = touch_facet(&cutter, &pose, corners);
-            // Where a facet meets the reach in a single point of its edge, rounding alone decides.
+            // Where a facet meets the reach in a single point of its edge, rounding alone decides: across
+            // the axis, and along it where a torus rises straight up from its end.
+            let width = match cutter {
+                Cutter::Torus { minor_radius, .. } => minor_radius - 1.0e-9,
+                Cutter::Cone { width, .. } => width / 2.0,
+            };
             let inside = |p: Point| {
                 let [d, _, z] = pose.face(p);
-                cutter.profile(d).is_some_and(|m| z.abs() <= m - 1.0e-9)
+                let m = cutter.profile(d).filter(|_| d.abs() <= width);
+                m.is_some_and(|m| z.abs() <= m - 1.0e-9)
             };
             let n = 60;
             let mut sampled = f64::NEG_INFINITY;
