@@ -1,31 +1,18 @@
-//! From rows to leaves: which candidates lie together.
+//! From rows to leaves: which candidates lie together, and which leaves do.
 //!
-//! A run of joined isolines is cut into blocks along its own lines, which costs nothing; the triangles
-//! and points of slabs are halved along their longest side until a leaf holds them.
+//! A run of joined isolines is cut along its own lines, which costs nothing and leaves no gaps between leaves nor
+//! laps of one over another; the triangles and points of slabs are halved along their longest side.
 
 use std::ops::Range;
 
-use crate::leaf::{FACETS, FacetLeaf, POINTS, PointLeaf};
+use crate::lanes::LANES;
+use crate::leaf::{FACETS, FacetLeaf, POINTS, PointLeaf, VERTICES};
 use crate::row::{Row, RowKind, cell};
 use crate::vector::{Point, add_scaled, sub};
 
-/// Rows and columns of a block of points.
-const SIDE: usize = 4;
-
-/// Rows and columns of a block of cells.
-const CELLS: usize = 2;
-const _: () = assert!(2 * CELLS * CELLS == FACETS && SIDE * SIDE == POINTS);
-
 /// Candidates that will be one leaf.
-#[derive(Debug, Clone)]
-pub(crate) struct Block {
-    /// About their middle, mm.
-    pub middle: Point,
-    what: What,
-}
-
-#[derive(Debug, Clone)]
-enum What {
+#[derive(Debug)]
+pub(crate) enum Block {
     /// The points, or the cells, of these rows and columns.
     Tile {
         rows: Range<u32>,
@@ -34,6 +21,44 @@ enum What {
     /// Those of one row with these numbers.
     Scattered { row: u32, numbers: Box<[u32]> },
 }
+
+/// Blocks that will be the leaves of one node: one to [`LANES`] of them.
+#[derive(Debug)]
+pub(crate) struct Bundle {
+    /// About their middle, mm.
+    pub middle: Point,
+    pub blocks: Vec<Block>,
+}
+
+/// How a run is cut.
+#[derive(Debug, Clone, Copy)]
+struct Cut {
+    /// Rows and columns of a block.
+    block: [usize; 2],
+    /// Blocks side by side in a bundle.
+    bundle: [usize; 2],
+}
+
+/// That of points.
+const POINT_CUT: Cut = Cut {
+    block: [4, POINTS / 4],
+    bundle: [2, LANES / 2],
+};
+
+/// That of cells.
+const CELL_CUT: Cut = Cut {
+    block: [2, 4],
+    bundle: [4, LANES / 4],
+};
+
+const _: () = {
+    let [rows, columns] = CELL_CUT.block;
+    assert!(2 * rows * columns <= FACETS && (rows + 1) * (columns + 1) <= VERTICES);
+};
+
+/// Facets of a mesh in a leaf at most: so many that lie together have no more vertices than a leaf has room for,
+/// as a rule.
+const SCATTERED: usize = 12;
 
 /// Runs of rows: joined isolines, or a slab or an isoline by itself.
 pub(crate) fn runs(rows: &[Row]) -> impl Iterator<Item = (usize, &[Row])> {
@@ -47,92 +72,153 @@ pub(crate) fn runs(rows: &[Row]) -> impl Iterator<Item = (usize, &[Row])> {
     })
 }
 
-/// Blocks of all points.
-pub(crate) fn point_blocks(rows: &[Row]) -> Vec<Block> {
-    let mut blocks = Vec::new();
+/// Bundles of all points.
+pub(crate) fn point_bundles(rows: &[Row]) -> Vec<Bundle> {
+    let mut bundles = Vec::new();
     for (first, run) in runs(rows) {
+        let points = &run[0].points;
         match &run[0].kind {
-            RowKind::Slab { .. } => scatter(first, &run[0].points, POINTS, &mut blocks),
+            RowKind::Slab { .. } => {
+                let mut numbers: Vec<u32> = (0..points.len() as u32).collect();
+                let fits = |lot: &[u32]| lot.len() <= POINTS;
+                scatter(first, points, &mut numbers, POINTS, &fits, &mut bundles);
+            }
             RowKind::Isoline { .. } => {
-                let side = run.len().min(SIDE);
-                let size = [run.len(), run[0].points.len()];
-                tile(first, run, size, [side, POINTS / side], &mut blocks);
+                let rows = run.len().min(POINT_CUT.block[0]);
+                let cut = Cut {
+                    block: [rows, POINTS / rows],
+                    ..POINT_CUT
+                };
+                tile(first, run, [run.len(), points.len()], cut, &mut bundles);
             }
         }
     }
-    blocks
+    bundles
 }
 
-/// Blocks of all facets.
-pub(crate) fn facet_blocks(rows: &[Row]) -> Vec<Block> {
-    let mut blocks = Vec::new();
+/// Bundles of all facets.
+pub(crate) fn facet_bundles(rows: &[Row]) -> Vec<Bundle> {
+    let mut bundles = Vec::new();
     for (first, run) in runs(rows) {
+        let points = &run[0].points;
         match &run[0].kind {
             RowKind::Slab { facets } => {
-                let points = &run[0].points;
                 let middle = |f: &[u32; 3]| {
                     let [a, b, c] = f.map(|c| points[c as usize]);
                     [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
                 };
                 let middles: Vec<Point> = facets.iter().map(middle).collect();
-                scatter(first, &middles, FACETS, &mut blocks);
+                let mut numbers: Vec<u32> = (0..facets.len() as u32).collect();
+                let fits =
+                    |lot: &[u32]| lot.len() <= SCATTERED && corners(facets, lot).1 <= VERTICES;
+                scatter(
+                    first,
+                    &middles,
+                    &mut numbers,
+                    SCATTERED,
+                    &fits,
+                    &mut bundles,
+                );
             }
             RowKind::Isoline { .. } => {
-                let cells = [run.len() - 1, run[0].points.len().saturating_sub(1)];
-                tile(first, run, cells, [CELLS, CELLS], &mut blocks);
+                let cells = [run.len() - 1, points.len().saturating_sub(1)];
+                tile(first, run, cells, CELL_CUT, &mut bundles);
             }
         }
     }
-    blocks
+    bundles
 }
 
-/// Cuts `size` rows and columns of a run into blocks of `side`.
-fn tile(first: usize, run: &[Row], size: [usize; 2], side: [usize; 2], blocks: &mut Vec<Block>) {
-    blocks.reserve(size[0].div_ceil(side[0]) * size[1].div_ceil(side[1]));
-    for row in (0..size[0]).step_by(side[0]) {
-        let rows = row..size[0].min(row + side[0]);
-        let middle = &run[rows.start + rows.len() / 2].points;
-        for column in (0..size[1]).step_by(side[1]) {
-            let columns = column..size[1].min(column + side[1]);
-            blocks.push(Block {
-                middle: middle[columns.start + columns.len() / 2],
-                what: What::Tile {
-                    rows: (first + rows.start) as u32..(first + rows.end) as u32,
+/// Cuts `size` rows and columns of a run.
+fn tile(first: usize, run: &[Row], size: [usize; 2], cut: Cut, bundles: &mut Vec<Bundle>) {
+    let [rows, columns] = cut.block;
+    let high = cut.bundle[0].min(size[0].div_ceil(rows));
+    let [high, wide] = [high * rows, LANES / high.max(1) * columns];
+    let parts = |whole: Range<usize>, step: usize| {
+        let end = whole.end;
+        whole.step_by(step).map(move |at| at..end.min(at + step))
+    };
+    for across in parts(0..size[0], high.max(1)) {
+        let middle = &run[across.start + across.len() / 2].points;
+        for along in parts(0..size[1], wide) {
+            let blocks = parts(across.clone(), rows).flat_map(|rows| {
+                let rows = (first + rows.start) as u32..(first + rows.end) as u32;
+                parts(along.clone(), columns).map(move |columns| Block::Tile {
+                    rows: rows.clone(),
                     columns: columns.start as u32..columns.end as u32,
-                },
+                })
+            });
+            bundles.push(Bundle {
+                middle: middle[along.start + along.len() / 2],
+                blocks: blocks.collect(),
             });
         }
     }
 }
 
-/// Halves candidates along their longest side until each lot fits into a leaf.
-fn scatter(row: usize, middles: &[Point], leaf: usize, blocks: &mut Vec<Block>) {
-    let mut numbers: Vec<u32> = (0..middles.len() as u32).collect();
-    let mut lots = vec![&mut numbers[..]];
-    let at = |n: &u32| middles[*n as usize];
+/// Halves candidates until the leaves of each lot fit into a bundle; a leaf has `full` candidates at most.
+fn scatter(
+    row: usize,
+    middles: &[Point],
+    numbers: &mut [u32],
+    full: usize,
+    fits: &impl Fn(&[u32]) -> bool,
+    bundles: &mut Vec<Bundle>,
+) {
+    let mut lots = vec![numbers];
     while let Some(lot) = lots.pop() {
-        if lot.is_empty() {
-            // A row from outside may have nothing in it.
-        } else if lot.len() <= leaf {
-            let sum = lot
-                .iter()
-                .fold([0.0; 3], |sum, n| add_scaled(sum, 1.0, at(n)));
-            blocks.push(Block {
-                middle: sum.map(|s| s / lot.len() as f64),
-                what: What::Scattered {
-                    row: row as u32,
-                    numbers: (&*lot).into(),
-                },
-            });
-        } else {
-            let axis = longest_side(lot.iter().map(at));
-            // Full leaves on the left.
-            let half = (lot.len().div_ceil(leaf) / 2) * leaf;
-            lot.select_nth_unstable_by(half, |a, b| at(a)[axis].total_cmp(&at(b)[axis]));
-            let (left, right) = lot.split_at_mut(half);
-            lots.extend([left, right]);
+        if lot.len() <= LANES * full {
+            let mut blocks = Vec::with_capacity(LANES);
+            let mut parts = vec![&mut *lot];
+            while let Some(part) = parts.pop() {
+                if part.is_empty() {
+                    // A row from outside may have nothing in it.
+                } else if fits(part) {
+                    blocks.push(Block::Scattered {
+                        row: row as u32,
+                        numbers: (&*part).into(),
+                    });
+                } else {
+                    parts.extend(halves(middles, part, full));
+                }
+            }
+            if blocks.len() <= LANES {
+                let sum = lot.iter().fold([0.0; 3], |sum, n| {
+                    add_scaled(sum, 1.0, middles[*n as usize])
+                });
+                if !blocks.is_empty() {
+                    let middle = sum.map(|s| s / lot.len() as f64);
+                    bundles.push(Bundle { middle, blocks });
+                }
+                continue;
+            }
+        }
+        lots.extend(halves(middles, lot, full));
+    }
+}
+
+/// Halves candidates along their longest side, with full leaves on the left if there is more than one.
+fn halves<'a>(middles: &[Point], lot: &'a mut [u32], full: usize) -> [&'a mut [u32]; 2] {
+    let at = |n: &u32| middles[*n as usize];
+    let axis = longest_side(lot.iter().map(at));
+    let half = match lot.len().div_ceil(full) / 2 * full {
+        0 => lot.len() / 2,
+        half => half,
+    };
+    lot.select_nth_unstable_by(half, |a, b| at(a)[axis].total_cmp(&at(b)[axis]));
+    lot.split_at_mut(half).into()
+}
+
+/// The vertices of some facets, each once, and how many they are; no more than one too many for a leaf.
+fn corners(facets: &[[u32; 3]], some: &[u32]) -> ([u32; VERTICES + 1], usize) {
+    let (mut vertices, mut count) = ([0; VERTICES + 1], 0);
+    for vertex in some.iter().flat_map(|&n| facets[n as usize]) {
+        if count <= VERTICES && !vertices[..count].contains(&vertex) {
+            vertices[count] = vertex;
+            count += 1;
         }
     }
+    (vertices, count)
 }
 
 /// The axis along which points extend most.
@@ -164,8 +250,8 @@ pub(crate) fn point_leaf(rows: &[Row], block: &Block) -> PointLeaf {
 
 /// Each point of a block by its row and its place there.
 fn each_point(rows: &[Row], block: &Block, mut each: impl FnMut(&Row, usize)) {
-    match &block.what {
-        What::Tile {
+    match block {
+        Block::Tile {
             rows: some,
             columns,
         } => {
@@ -173,7 +259,7 @@ fn each_point(rows: &[Row], block: &Block, mut each: impl FnMut(&Row, usize)) {
                 columns.clone().for_each(|i| each(row, i as usize));
             }
         }
-        What::Scattered { row, numbers } => {
+        Block::Scattered { row, numbers } => {
             let row = &rows[*row as usize];
             numbers.iter().for_each(|&i| each(row, i as usize));
         }
@@ -182,8 +268,8 @@ fn each_point(rows: &[Row], block: &Block, mut each: impl FnMut(&Row, usize)) {
 
 /// Leaves the vertices of a block of facets to `take`, each once, some at a time.
 pub(crate) fn facet_vertices(rows: &[Row], block: &Block, take: &mut dyn FnMut(&[Point])) {
-    match &block.what {
-        What::Tile {
+    match block {
+        Block::Tile {
             rows: some,
             columns,
         } => {
@@ -192,17 +278,11 @@ pub(crate) fn facet_vertices(rows: &[Row], block: &Block, take: &mut dyn FnMut(&
                 take(&row.points[columns.clone()]);
             }
         }
-        What::Scattered { row, numbers } => {
+        Block::Scattered { row, numbers } => {
             let row = &rows[*row as usize];
-            let facets = row.facets();
-            let mut corners = [0; 3 * FACETS];
-            let corners = &mut corners[..3 * numbers.len()];
-            for (corners, &n) in corners.chunks_exact_mut(3).zip(numbers) {
-                corners.copy_from_slice(&facets[n as usize]);
-            }
-            corners.sort_unstable();
-            for distinct in corners.chunk_by(|a, b| a == b) {
-                let vertex = distinct[0] as usize;
+            let (vertices, count) = corners(row.facets(), numbers);
+            for &vertex in &vertices[..count] {
+                let vertex = vertex as usize;
                 take(&row.points[vertex..=vertex]);
             }
         }
@@ -217,34 +297,48 @@ pub(crate) fn facet_leaf(
     block: &Block,
 ) -> FacetLeaf {
     let (mut facets, mut count) = ([([0; 3], 0); FACETS], 0);
-    let mut push = |corners, id| {
-        facets[count] = (corners, id);
+    let (mut vertices, mut different) = ([0; VERTICES], 0);
+    let mut push = |corners, number| {
+        facets[count] = (corners, number);
         count += 1;
     };
-    match &block.what {
-        What::Tile {
+    match block {
+        Block::Tile {
             rows: some,
             columns,
         } => {
-            for row in some.start as usize..some.end as usize {
-                for column in columns.clone() {
+            for start in &starts[some.start as usize..=some.end as usize] {
+                for column in columns.start..=columns.end {
+                    vertices[different] = start + column;
+                    different += 1;
+                }
+            }
+            let wide = columns.len() as u32 + 1;
+            for (i, row) in (0..).zip(some.start as usize..some.end as usize) {
+                for (j, column) in (0..).zip(columns.clone()) {
+                    let slots = cell(i * wide + j, (i + 1) * wide + j);
+                    let [a, b] = slots.map(|facet| facet.map(|slot| slot as u8));
                     let first = rows[row].candidate(2 * column as usize);
-                    let [a, b] = cell(starts[row] + column, starts[row + 1] + column);
                     push(a, first);
                     push(b, first + 1);
                 }
             }
         }
-        What::Scattered { row, numbers } => {
+        Block::Scattered { row, numbers } => {
             let (row, start) = (&rows[*row as usize], starts[*row as usize]);
-            let facets = row.facets();
+            let (known, count) = corners(row.facets(), numbers);
+            for (vertex, known) in vertices.iter_mut().zip(&known[..count]) {
+                *vertex = start + known;
+            }
+            different = count;
             for &n in numbers {
-                let n = n as usize;
-                push(facets[n].map(|c| start + c), row.candidate(n));
+                let slot = |c| known.iter().position(|&vertex| vertex == c);
+                let slots = row.facets()[n as usize].map(|c| slot(c).map_or(0, |slot| slot as u8));
+                push(slots, row.candidate(n as usize));
             }
         }
     }
-    FacetLeaf::new(points, &facets[..count])
+    FacetLeaf::new(points, &vertices[..different], &facets[..count])
 }
 
 #[cfg(test)]
@@ -252,7 +346,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_a_row_with_nothing_in_it_there_is_no_block() {
+    fn of_a_row_with_nothing_in_it_there_is_no_bundle() {
         let isoline = RowKind::Isoline { joins_next: false };
         for kind in [RowKind::Slab { facets: Vec::new() }, isoline] {
             let row = Row {
@@ -260,8 +354,8 @@ mod tests {
                 points: Vec::new(),
                 kind,
             };
-            assert!(point_blocks(std::slice::from_ref(&row)).is_empty());
-            assert!(facet_blocks(&[row]).is_empty());
+            assert!(point_bundles(std::slice::from_ref(&row)).is_empty());
+            assert!(facet_bundles(&[row]).is_empty());
         }
     }
 }

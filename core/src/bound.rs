@@ -4,48 +4,21 @@
 //! near the piece, where the cutter is tangent to it, the bound's slack is of second order in the
 //! piece's size; taken at the highest touch so far, it rules out whatever lies behind that touch. Out
 //! of reach a cylinder around the cutter bounds, to first order. Bounds decide only what is skipped:
-//! they need to be safe, not the same everywhere, so they make do with single precision and
-//! a slack for it.
+//! they need to be safe, not the same everywhere, so they make do with single precision, multiply and add in
+//! one step where there is an instruction for it, and have a slack for both.
 
-mod facet;
+mod dome;
 mod fit;
 mod lid;
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::lanes::{LANES, slopes};
 use crate::tolerance::WELL_WITHIN;
-use crate::vector::Point;
 
-pub(crate) use facet::{Near, facet_bounds};
+pub(crate) use dome::{Dome, NearDome, Spots};
 pub(crate) use lid::{Frame, Lids, Swing, View, lid_bounds};
-
-/// A plane that F nowhere exceeds, as a linear function of the part's points.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Plane {
-    /// Its slopes along x, y and z of the part.
-    pub slope: Point,
-    /// Its height at the origin, mm.
-    pub height: f64,
-}
-
-impl Plane {
-    /// The tangent plane at a place on the cutter, `(d, z)`.
-    #[inline(always)]
-    pub fn at(cutter: &Cutter, pose: &Pose, [d, z]: [f64; 2]) -> Self {
-        let t = Tangent::near(cutter, d, z);
-        Self {
-            slope: [
-                t.by_d,
-                pose.cos + pose.sin * t.by_z,
-                pose.cos * t.by_z - pose.sin,
-            ],
-            height: t.rise - t.by_d * (pose.x + t.d) - t.by_z * t.z,
-        }
-    }
-}
 
 /// The tangent plane of G(d, z) = √(m(d)² − z²).
 struct Tangent {
@@ -115,26 +88,10 @@ impl<S: Simd> Slopes<S> {
         }
     }
 
-    /// F's upper bounds at points seen from the cutter.
-    #[inline(always)]
-    fn over(&self, points: [Eight<S>; 3]) -> [f32x8<S>; 3] {
-        let start = (-self.by_d).mul_add(self.d, (-self.by_z).mul_add(self.z, self.rise));
-        points.map(
-            #[inline(always)]
-            |[d, y, z]| self.by_d.mul_add(d, self.by_z.mul_add(z, y + start)),
-        )
-    }
-
     /// The plane's slopes together, the attack axis's own included.
     #[inline(always)]
     fn steep(&self) -> f32x8<S> {
         self.by_d.abs() + self.by_z.abs() + 1.0
-    }
-
-    /// F's slope along a way.
-    #[inline(always)]
-    fn along(&self, way: [f32x8<S>; 3]) -> f32x8<S> {
-        self.by_d.mul_add(way[0], self.by_z.mul_add(way[2], way[1]))
     }
 }
 
@@ -150,29 +107,10 @@ pub(crate) fn load<S: Simd>(simd: S, axes: &[[f32; LANES]; 3]) -> Eight<S> {
     ]
 }
 
-// Products and sums in one step where there is an instruction for it: it does not matter how a bound is rounded.
-
+/// Scalar products.
 #[inline(always)]
 fn dot<S: Simd>(a: Eight<S>, b: Eight<S>) -> f32x8<S> {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
-}
-
-#[inline(always)]
-fn cross<S: Simd>(a: Eight<S>, b: Eight<S>) -> Eight<S> {
-    [
-        a[1].mul_sub(b[2], a[2] * b[1]),
-        a[2].mul_sub(b[0], a[0] * b[2]),
-        a[0].mul_sub(b[1], a[1] * b[0]),
-    ]
-}
-
-#[inline(always)]
-fn add_scaled<S: Simd>(a: Eight<S>, s: f32x8<S>, b: Eight<S>) -> Eight<S> {
-    [
-        s.mul_add(b[0], a[0]),
-        s.mul_add(b[1], a[1]),
-        s.mul_add(b[2], a[2]),
-    ]
 }
 
 /// Turned about the spindle, then moved.
@@ -188,6 +126,7 @@ fn turn<S: Simd>([x, y, z]: Eight<S>, cos: f32, sin: f32, by: [f32; 3]) -> Eight
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::Pose;
     use proptest::prelude::*;
 
     pub(super) fn cutter(which: usize) -> Cutter {

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::between::{self, Probe};
 use crate::bisect::first_without;
 use crate::blocks::{
-    facet_blocks, facet_leaf, facet_vertices, point_blocks, point_leaf, point_vertices,
+    facet_bundles, facet_leaf, facet_vertices, point_bundles, point_leaf, point_vertices,
 };
 use crate::contact::{Pose, least_height};
 use crate::cutter::Cutter;
@@ -342,7 +342,7 @@ fn point_tree(simd: Token, rows: &[Row]) -> Tree<PointLeaf> {
     Tree::new(
         simd,
         Vec::new(),
-        point_blocks(rows),
+        point_bundles(rows),
         |_, block| point_leaf(rows, block),
         |block, take| point_vertices(rows, block, take),
     )
@@ -357,7 +357,7 @@ fn facet_tree(simd: Token, rows: &[Row]) -> Tree<FacetLeaf> {
     Tree::new(
         simd,
         points,
-        facet_blocks(rows),
+        facet_bundles(rows),
         |points, block| facet_leaf(rows, &starts, points, block),
         |block, take| facet_vertices(rows, block, take),
     )

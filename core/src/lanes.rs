@@ -4,7 +4,7 @@
 //! are the same bits. Nothing is multiplied and added in one step, and nothing depends on the other
 //! lanes.
 
-use fearless_simd::{Simd, f32x8, f64x8, mask64x8, prelude::*};
+use fearless_simd::{Simd, f32x8, f64x8, mask32x8, mask64x8, prelude::*};
 
 use crate::contact::Pose;
 use crate::cutter::Cutter;
@@ -26,6 +26,12 @@ pub(crate) fn lanes(mut some: Lanes) -> impl Iterator<Item = usize> {
             lane
         },
     )
+}
+
+/// The lanes of two vectors side by side.
+#[inline(always)]
+pub(crate) fn both<S: Simd>(low: mask32x8<S>, high: mask32x8<S>) -> Lanes {
+    low.to_bitmask() | high.to_bitmask() << LANES
 }
 
 /// m(d) of eight distances, and which of them are within the width.
@@ -68,39 +74,6 @@ pub(crate) fn slopes<S: Simd>(
             let slope = slope as f32;
             let m = d * slope + radius as f32;
             (m, f32x8::splat(simd, 1.0), f32x8::splat(simd, slope))
-        }
-    }
-}
-
-/// About `(d, z)` of the places where the cutter first meets planes of these normals, which need not be of
-/// length 1, but must point towards it.
-#[inline(always)]
-pub(crate) fn supports<S: Simd>(
-    simd: S,
-    cutter: &Cutter,
-    [x, y, z]: [f32x8<S>; 3],
-) -> (f32x8<S>, f32x8<S>) {
-    let across = y.mul_add(y, z * z);
-    match *cutter {
-        Cutter::Torus {
-            major_radius,
-            minor_radius,
-        } => {
-            let share = f32x8::splat(simd, minor_radius as f32) / x.mul_add(x, across).sqrt();
-            let disc = f32x8::splat(simd, major_radius as f32) / across.sqrt();
-            (-(share * x), -((share + disc) * z))
-        }
-        Cutter::Cone {
-            radius,
-            width,
-            slope,
-            ..
-        } => {
-            // At one rim or the other.
-            let across = across.sqrt();
-            let rim = f32x8::splat(simd, (width / 2.0) as f32);
-            let d = (across * slope as f32 - x).simd_gt(0.0).select(rim, -rim);
-            (d, -((d * slope as f32 + radius as f32) * z / across))
         }
     }
 }

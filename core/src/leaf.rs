@@ -1,10 +1,11 @@
 //! Leaves of the hierarchy: a few candidates that lie together, laid out for vectors.
 //!
-//! A leaf is solved exactly. A grid's is a block of four by four points or cells, a mesh's a handful of
+//! A leaf is solved exactly. A grid's is a block of four by four points or two by four cells, a mesh's a handful of
 //! triangles that share vertices. A candidate carries its number in the part, which breaks ties.
 
 mod facets;
 mod points;
+mod sight;
 
 use crate::contact::Pose;
 use crate::cutter::Cutter;
@@ -13,7 +14,7 @@ use crate::path::Touch;
 use crate::simd::Set;
 use crate::vector::Point;
 
-pub(crate) use facets::{FACETS, FacetLeaf};
+pub(crate) use facets::{FACETS, FacetLeaf, VERTICES};
 pub(crate) use points::{POINTS, PointLeaf};
 
 /// What is known before a search.
@@ -91,24 +92,26 @@ impl Best {
 
 /// Up to eight positions that are searched together.
 #[derive(Debug)]
-pub(crate) struct Batch<'a, C> {
+pub(crate) struct Batch<'a, S> {
     pub cutter: &'a Cutter,
     pub starts: &'a [Start],
     /// The highest that each of them has found.
     pub best: &'a mut [Best; LANES],
-    /// What no candidate of each is above; it touches F where the highest is touched.
-    pub ceilings: [C; LANES],
+    /// What each of them sees of a leaf.
+    pub sights: [S; LANES],
 }
 
 /// A few candidates.
 pub(crate) trait Leaf: Sync + Send {
-    /// What rules candidates out before they are evaluated.
-    type Ceiling: Copy;
+    /// What a position sees of it, before any candidate is evaluated.
+    type Sight: Copy;
+    /// Nothing seen.
+    const NOTHING: Self::Sight;
 
-    /// The ceiling that touches F at a place on the cutter, `(d, z)`.
-    fn ceiling(cutter: &Cutter, pose: &Pose, place: [f64; 2]) -> Self::Ceiling;
+    /// The highest touch is expected at a place on the cutter, `(d, z)`.
+    fn expect(sight: &mut Self::Sight, cutter: &Cutter, pose: &Pose, place: [f64; 2]);
 
-    /// Raises the best of each position that is `alive` to the highest candidate, and its ceiling with it.
+    /// Raises the best of each position that is `alive` to the highest candidate.
     /// Returns how many candidates were evaluated, and the positions that were raised.
     ///
     /// Each step is taken for all positions before the next one: what one of them computes does not wait for
@@ -117,7 +120,16 @@ pub(crate) trait Leaf: Sync + Send {
         &self,
         simd: S,
         points: &[Point],
-        batch: &mut Batch<Self::Ceiling>,
+        batch: &mut Batch<Self::Sight>,
         alive: Lanes,
     ) -> (u64, Lanes);
 }
+
+/// What is far above the rounding of heights about such a one, mm.
+#[inline(always)]
+fn margin(cutter: &Cutter, pose: &Pose, height: f64) -> f64 {
+    MARGIN * (cutter.max_radius() + height.abs() + pose.x.abs())
+}
+
+/// That margin, relative to the lengths involved.
+const MARGIN: f64 = 1.0e-7;

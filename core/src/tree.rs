@@ -9,7 +9,7 @@ use std::ops::Range;
 use fearless_simd::{Simd, f32x8, prelude::*};
 use rayon::prelude::*;
 
-use crate::blocks::{Block, longest_side};
+use crate::blocks::{Block, Bundle, longest_side};
 use crate::bound::{Frame, Lids, Swing, View, lid_bounds};
 use crate::cutter::Cutter;
 use crate::lanes::{LANES, Lanes, lanes};
@@ -40,34 +40,38 @@ struct Node {
 /// Tells a node from a leaf.
 const INNER: u32 = 1 << 31;
 
-/// Leaves below which a subtree is built by one thread.
-const ALONE: usize = 256;
+/// Bundles of leaves below which a subtree is built by one thread.
+const ALONE: usize = 32;
 
 impl<L: Leaf> Tree<L> {
-    /// Builds the hierarchy, in parallel on the current thread pool.
+    /// Builds the hierarchy, in parallel on the current thread pool: a node over each bundle, and nodes over these.
     pub fn new(
         simd: Token,
         points: Vec<Point>,
-        mut blocks: Vec<Block>,
+        mut bundles: Vec<Bundle>,
         fill: impl Fn(&[Point], &Block) -> L + Sync + Send,
         vertices: impl Fn(&Block, &mut dyn FnMut(&[Point])) + Sync + Send,
     ) -> Self {
-        arrange(&mut blocks);
-        let leaves = blocks.par_iter().with_min_len(ALONE);
+        arrange(&mut bundles);
+        let mut firsts = vec![0];
+        firsts.extend(bundles.iter().scan(0, |next, bundle| {
+            *next += bundle.blocks.len();
+            Some(*next)
+        }));
+        let blocks: Vec<Block> = bundles.into_iter().flat_map(|b| b.blocks).collect();
+        let leaves = blocks.par_iter().with_min_len(ALONE * LANES);
         let leaves: Vec<L> = leaves.map(|block| fill(&points, block)).collect();
         let vertices = Vertices::of(&blocks, vertices);
-        let frame = vertices.frame();
-        let empty = Node {
-            lids: Lids::EMPTY,
-            children: [0; LANES],
+        let build = Build {
+            simd,
+            frame: vertices.frame(),
+            vertices,
+            upper: upper(firsts.len() - 1),
+            firsts,
         };
-        let mut nodes = vec![empty; nodes(leaves.len())];
-        if !leaves.is_empty() {
-            build(simd, &frame, &vertices, 0..leaves.len(), &mut nodes, 0);
-        }
         Self {
-            frame,
-            nodes,
+            frame: build.frame,
+            nodes: build.nodes(),
             leaves,
             points,
         }
@@ -138,13 +142,13 @@ impl<L: Leaf> Tree<L> {
             cutter,
             starts,
             best,
-            ceilings: [L::ceiling(cutter, &first.pose, first.place); LANES],
+            sights: [L::NOTHING; LANES],
         };
         let mut heights = [f32::INFINITY; LANES];
         for lane in lanes(active) {
             let start = &starts[lane];
             views[lane] = View::new(&self.frame, cutter, &start.pose, start.place);
-            batch.ceilings[lane] = L::ceiling(cutter, &start.pose, start.place);
+            L::expect(&mut batch.sights[lane], cutter, &start.pose, start.place);
             heights[lane] = under(batch.best[lane].height);
         }
         let swing = Swing::new(cutter, starts.iter().map(|start| start.pose));
@@ -204,8 +208,8 @@ struct Stack {
 }
 
 impl Stack {
-    /// Seven for each level of the tree, of which there are at most eleven, and one more.
-    const SIZE: usize = 80;
+    /// Seven for each level of the tree, of which there are at most twelve, and one more.
+    const SIZE: usize = 85;
 
     #[inline(always)]
     fn new() -> Self {
@@ -271,47 +275,44 @@ impl Stack {
     }
 }
 
-/// Leaves of each full child of a node over `leaves` leaves: the greatest power of eight below them.
-fn child_size(leaves: usize) -> usize {
+/// Bundles of each full child of a node over `bundles`: the greatest power of eight below them.
+fn child_size(bundles: usize) -> usize {
     let mut size = 1;
-    while size * LANES < leaves {
+    while size * LANES < bundles {
         size *= LANES;
     }
     size
 }
 
-/// Nodes of a tree over `leaves` leaves; all children but the last are full.
-fn nodes(leaves: usize) -> usize {
-    if leaves == 0 {
+/// Nodes of a tree over so many bundles, without those of the bundles themselves; all children but the last are full.
+fn upper(bundles: usize) -> usize {
+    if bundles < 2 {
         return 0;
     }
-    let size = child_size(leaves);
-    if size == 1 {
-        return 1;
-    }
-    let (full, rest) = (leaves / size, leaves % size);
-    1 + full * nodes(size) + nodes(rest)
+    let size = child_size(bundles);
+    let (full, rest) = (bundles / size, bundles % size);
+    1 + full * upper(size) + upper(rest)
 }
 
-/// Orders blocks so that those of each node lie together.
-fn arrange(blocks: &mut [Block]) {
-    let size = child_size(blocks.len());
+/// Orders bundles so that those of each node lie together.
+fn arrange(bundles: &mut [Bundle]) {
+    let size = child_size(bundles.len());
     if size > 1 {
-        part(blocks, size);
+        part(bundles, size);
     }
 }
 
-/// Parts blocks into children of `size` blocks, halving along the longest side.
-fn part(blocks: &mut [Block], size: usize) {
-    if blocks.len() <= size {
-        return arrange(blocks);
+/// Parts bundles into children of `size` each, halving along the longest side.
+fn part(bundles: &mut [Bundle], size: usize) {
+    if bundles.len() <= size {
+        return arrange(bundles);
     }
-    let children = blocks.len().div_ceil(size);
+    let children = bundles.len().div_ceil(size);
     let left = children / 2 * size;
-    let axis = longest_side(blocks.iter().map(|b| b.middle));
-    let middle = |b: &Block| b.middle[axis];
-    blocks.select_nth_unstable_by(left, |a, b| middle(a).total_cmp(&middle(b)));
-    let (left, right) = blocks.split_at_mut(left);
+    let axis = longest_side(bundles.iter().map(|b| b.middle));
+    let middle = |b: &Bundle| b.middle[axis];
+    bundles.select_nth_unstable_by(left, |a, b| middle(a).total_cmp(&middle(b)));
+    let (left, right) = bundles.split_at_mut(left);
     if right.len() < ALONE {
         part(left, size);
         part(right, size);
@@ -320,54 +321,93 @@ fn part(blocks: &mut [Block], size: usize) {
     }
 }
 
-/// Fills the nodes over leaves that are in order; `offset` is the place of the first node.
-fn build(
+/// What nodes are built from.
+struct Build {
     simd: Token,
-    frame: &Frame,
-    vertices: &Vertices,
-    leaves: Range<usize>,
-    nodes: &mut [Node],
-    offset: usize,
-) {
-    let size = child_size(leaves.len());
-    let Some((node, mut below)) = nodes.split_first_mut() else {
-        return;
-    };
-    let child = |start: usize| start..leaves.end.min(start + size);
-    let starts = || leaves.clone().step_by(size).enumerate();
-    let mut tasks = Vec::with_capacity(LANES);
-    let mut at = offset + 1;
-    for (lane, start) in starts() {
-        node.children[lane] = start as u32;
-        if size > 1 {
-            node.children[lane] = INNER | at as u32;
-            let (own, rest) = below.split_at_mut(self::nodes(child(start).len()));
-            below = rest;
-            let nodes = own.len();
-            tasks.push((child(start), own, at));
-            at += nodes;
-        }
-    }
-    let fill = |node: &mut Node| {
-        for (lane, start) in starts() {
-            let points = vertices.under(child(start));
-            with_simd!(simd, simd => node.lids.set(simd, lane, frame, points));
-        }
-    };
-    if leaves.len() < ALONE {
-        fill(node);
-        for (child, nodes, offset) in tasks {
-            build(simd, frame, vertices, child, nodes, offset);
-        }
-    } else {
+    frame: Frame,
+    vertices: Vertices,
+    /// The first leaf of each bundle, and one beyond the last.
+    firsts: Vec<usize>,
+    /// Nodes above those of the bundles, which come after them.
+    upper: usize,
+}
+
+impl Build {
+    fn nodes(&self) -> Vec<Node> {
+        let bundles = self.firsts.len() - 1;
+        let empty = Node {
+            lids: Lids::EMPTY,
+            children: [0; LANES],
+        };
+        let mut nodes = vec![empty; self.upper + bundles];
+        let (upper, low) = nodes.split_at_mut(self.upper);
         rayon::join(
-            || fill(node),
+            || self.upper(0..bundles, upper, 0),
             || {
-                let tasks = tasks.into_par_iter();
-                tasks.for_each(|(child, nodes, offset)| {
-                    build(simd, frame, vertices, child, nodes, offset);
-                });
+                let low = low.par_iter_mut().with_min_len(ALONE).enumerate();
+                low.for_each(|(bundle, node)| self.low(bundle, node));
             },
         );
+        nodes
+    }
+
+    /// Fills the node of a bundle.
+    fn low(&self, bundle: usize, node: &mut Node) {
+        let leaves = self.firsts[bundle]..self.firsts[bundle + 1];
+        for (lane, leaf) in leaves.enumerate() {
+            node.children[lane] = leaf as u32;
+            self.cover(node, lane, leaf..leaf + 1);
+        }
+    }
+
+    /// Fills the nodes over bundles that are in order; `offset` is the place of the first node.
+    fn upper(&self, bundles: Range<usize>, nodes: &mut [Node], offset: usize) {
+        let size = child_size(bundles.len());
+        let Some((node, mut below)) = nodes.split_first_mut() else {
+            return;
+        };
+        let child = |start: usize| start..bundles.end.min(start + size);
+        let starts = || bundles.clone().step_by(size).enumerate();
+        let mut tasks = Vec::with_capacity(LANES);
+        let mut at = offset + 1;
+        for (lane, start) in starts() {
+            let child = child(start);
+            let (own, rest) = below.split_at_mut(upper(child.len()));
+            below = rest;
+            let place = match own.len() {
+                0 => self.upper + start,
+                _ => at,
+            };
+            node.children[lane] = INNER | place as u32;
+            let nodes = own.len();
+            tasks.push((child, own, at));
+            at += nodes;
+        }
+        let fill = |node: &mut Node| {
+            for (lane, start) in starts() {
+                let Range { start, end } = child(start);
+                self.cover(node, lane, self.firsts[start]..self.firsts[end]);
+            }
+        };
+        if bundles.len() < ALONE {
+            fill(node);
+            for (child, nodes, offset) in tasks {
+                self.upper(child, nodes, offset);
+            }
+        } else {
+            rayon::join(
+                || fill(node),
+                || {
+                    let tasks = tasks.into_par_iter();
+                    tasks.for_each(|(child, nodes, offset)| self.upper(child, nodes, offset));
+                },
+            );
+        }
+    }
+
+    /// Puts a lid around leaves.
+    fn cover(&self, node: &mut Node, lane: usize, leaves: Range<usize>) {
+        let points = self.vertices.under(leaves);
+        with_simd!(self.simd, simd => node.lids.set(simd, lane, &self.frame, points));
     }
 }

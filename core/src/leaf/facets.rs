@@ -1,79 +1,99 @@
-//! Leaves of facets: those of two by two cells of a grid, or a handful of a mesh's that share vertices.
+//! Leaves of facets: those of two by four cells of a grid, or a handful of a mesh's that share vertices.
 
-use fearless_simd::{f32x8, mask32x8, prelude::*, u32x8};
+use fearless_simd::{Simd, f32x8, prelude::*, u32x8};
 
-use super::{Batch, Best, Leaf};
-use crate::bound::{Near, Plane, facet_bounds, load};
+use super::sight::Sight;
+use super::{Batch, Best, Leaf, margin};
+use crate::bound::Dome;
 use crate::contact::{Pose, Spot, height_well_within, touch_seen};
 use crate::cutter::Cutter;
-use crate::lanes::{LANES, Lanes, lanes};
+use crate::lanes::{LANES, Lanes, both, lanes};
 use crate::simd::Set;
 use crate::vector::{Interval, Point};
 
-/// Facets in a leaf: those of two by two cells.
-pub(crate) const FACETS: usize = LANES;
+/// Facets in a leaf at most, and vertices that they may have: two vectors of each.
+pub(crate) const FACETS: usize = 2 * LANES;
+pub(crate) const VERTICES: usize = 2 * LANES;
 
 /// Facets that lie together.
 #[derive(Debug, Clone)]
-#[repr(align(32))]
+#[repr(align(64))]
 pub(crate) struct FacetLeaf {
-    /// The corners of each facet from the middle on, in single precision: what the bounds need. Free
-    /// slots repeat the first facet.
-    near: [[[f32; FACETS]; 3]; 3],
-    middle: Point,
-    /// Largest distance of a corner from the middle, along any axis, mm.
-    size: f32,
-    count: u32,
-    /// The corners as places among all points: what is solved exactly.
-    corners: [[u32; FACETS]; 3],
-    ids: [u64; FACETS],
+    /// The vertices from the middle on, in single precision: what the bounds need. Free slots repeat the first.
+    near: [[f32; VERTICES]; 3],
+    pub middle: Point,
+    /// Largest distance of a vertex from the middle, along any axis, mm.
+    pub size: f32,
+    /// Squares of the longest edges along the spindle and across it, mm².
+    pub edge: [f32; 2],
+    /// The vertices of each facet, a bit for each; none of free slots.
+    masks: [u32; FACETS],
+    /// The vertices as places among all points, whose coordinates are what is solved exactly.
+    pub places: [u32; VERTICES],
+    /// The corners of each facet, as slots of vertices.
+    pub corners: [[u8; 3]; FACETS],
+    numbers: [u64; FACETS],
 }
 
 impl FacetLeaf {
-    /// Of one to [`FACETS`] facets with their numbers.
-    pub fn new(points: &[Point], facets: &[([u32; 3], u64)]) -> Self {
+    /// Of one to [`FACETS`] facets with their numbers. Their corners are slots of `vertices`, which are places among
+    /// `points`, at most [`VERTICES`], and each a corner of some facet.
+    pub fn new(points: &[Point], vertices: &[u32], facets: &[([u8; 3], u64)]) -> Self {
         let mut leaf = Self {
-            near: [[[0.0; FACETS]; 3]; 3],
+            near: [[0.0; VERTICES]; 3],
             middle: [0.0; 3],
             size: 0.0,
-            count: facets.len() as u32,
-            corners: [[0; FACETS]; 3],
-            ids: [Best::NOBODY; FACETS],
+            edge: [0.0; 2],
+            masks: [0; FACETS],
+            places: [vertices[0]; VERTICES],
+            corners: [[0; 3]; FACETS],
+            numbers: [Best::NOBODY; FACETS],
         };
-        // By corner and axis.
-        let mut at = [[[0.0; FACETS]; 3]; 3];
-        for slot in 0..FACETS {
-            let (corners, id) = *facets.get(slot).unwrap_or(&facets[0]);
-            leaf.ids[slot] = id;
-            let places = leaf.corners.iter_mut().zip(corners);
-            for (at, (place, corner)) in at.iter_mut().zip(places) {
-                place[slot] = corner;
-                let p = points[corner as usize];
-                for k in 0..3 {
-                    at[k][slot] = p[k];
-                }
-            }
-        }
-        for k in 0..3 {
-            let corners = at.each_ref().map(|axes| &axes[k]);
-            let Interval { low, high } = range(corners);
+        leaf.places[..vertices.len()].copy_from_slice(vertices);
+        for (k, near) in leaf.near.iter_mut().enumerate() {
+            let at = leaf.places.map(|place| points[place as usize][k]);
+            let Interval { low, high } = Interval::of(at);
             leaf.middle[k] = (low + high) / 2.0;
+            *near = at.map(|c| (c - leaf.middle[k]) as f32);
             leaf.size = leaf.size.max((high - leaf.middle[k]) as f32);
-            for (near, corner) in leaf.near.iter_mut().zip(corners) {
-                near[k] = corner.map(|c| (c - leaf.middle[k]) as f32);
+        }
+        for (slot, &(corners, number)) in facets.iter().enumerate() {
+            leaf.corners[slot] = corners;
+            leaf.masks[slot] = corners.iter().fold(0, |mask, c| mask | 1 << c);
+            leaf.numbers[slot] = number;
+            for k in 0..3 {
+                let [a, b] = [corners[k], corners[(k + 1) % 3]].map(usize::from);
+                let [x, y, z] = leaf.near.each_ref().map(|axis| axis[b] - axis[a]);
+                leaf.edge = [leaf.edge[0].max(x * x), leaf.edge[1].max(y * y + z * z)];
             }
         }
         leaf
     }
 
-    /// The corners of all of them, as the bounds see them.
+    /// Eight of the vertices.
     #[inline(always)]
-    fn corners_near<S: Set>(&self, simd: S) -> [[f32x8<S>; 3]; 3] {
+    pub fn eight<S: Simd>(&self, simd: S, first: usize) -> [f32x8<S>; 3] {
         [
-            load(simd, &self.near[0]),
-            load(simd, &self.near[1]),
-            load(simd, &self.near[2]),
+            f32x8::from_slice(simd, &self.near[0][first..first + LANES]),
+            f32x8::from_slice(simd, &self.near[1][first..first + LANES]),
+            f32x8::from_slice(simd, &self.near[2][first..first + LANES]),
         ]
+    }
+
+    /// The facets that have any of some vertices.
+    #[inline(always)]
+    pub fn having<S: Simd>(&self, simd: S, vertices: Lanes) -> Lanes {
+        let low = u32x8::from_slice(simd, &self.masks[..LANES]) & vertices as u32;
+        let high = u32x8::from_slice(simd, &self.masks[LANES..]) & vertices as u32;
+        both(low.simd_gt(0), high.simd_gt(0))
+    }
+
+    /// The slots of a vertex.
+    #[inline(always)]
+    fn slots<S: Simd>(&self, simd: S, vertex: u32) -> Lanes {
+        let low = u32x8::from_slice(simd, &self.places[..LANES]);
+        let high = u32x8::from_slice(simd, &self.places[LANES..]);
+        both(low.simd_eq(vertex), high.simd_eq(vertex))
     }
 
     /// Raises `best` to the facet in a slot; returns whether that did.
@@ -84,10 +104,9 @@ impl FacetLeaf {
         cutter: &Cutter,
         pose: &Pose,
         slot: usize,
-        margin: f64,
         best: &mut Best,
     ) -> bool {
-        let places = self.corners.map(|places| places[slot]);
+        let places = self.corners[slot].map(|c| self.places[usize::from(c)]);
         let corners = places.map(|place| points[place as usize]);
         let seen = [
             pose.face(corners[0]),
@@ -97,8 +116,9 @@ impl FacetLeaf {
         let Some((touch, spot)) = touch_seen(cutter, corners, seen, best.height) else {
             return false;
         };
-        let raised = best.raise(touch, self.ids[slot]);
+        let raised = best.raise(touch, self.numbers[slot]);
         if raised {
+            let margin = margin(cutter, pose, best.height);
             let height = |corner: usize| height_well_within(cutter, seen[corner]);
             let lower = |end| height(end).is_some_and(|h| h < touch.height - margin);
             best.held = match spot {
@@ -110,67 +130,39 @@ impl FacetLeaf {
         raised
     }
 
-    /// The facets that may be higher than `best`, or as high elsewhere; `ceiling` touches F where that is.
+    /// Those of the `open` facets that may be higher than `best`, or as high elsewhere, given how high the plane
+    /// that touches F where that is is over the vertices.
     ///
-    /// F is nowhere above the ceiling. Where a facet has what holds the cutter up, and the ceiling is lower than
-    /// `best` over its other vertices, it is touched there as well, at the same height to the last bit, and
-    /// nowhere higher; of such facets the lowest number counts. Where it has but one end of an edge that holds
+    /// F is nowhere above the plane. Where a facet has what holds the cutter up, and the plane is lower than `best`
+    /// over its other vertices, it is touched there as well, at the same height to the last bit, and nowhere
+    /// higher; of such facets the lowest number counts. Where it has but one end of an edge that holds
     /// the cutter up, which is lower, it is lower throughout. All by a margin that is far above the rounding of
     /// heights.
     #[inline(always)]
-    fn open<S: Set>(
-        &self,
-        simd: S,
-        pose: &Pose,
-        near: &Near,
-        ceiling: &Plane,
-        corners: &[[f32x8<S>; 3]; 3],
-        best: &mut Best,
-    ) -> Lanes {
-        let roof = near.roof(ceiling, pose, self.middle, best.base());
-        let over = [
-            roof.over(simd, corners[0]),
-            roof.over(simd, corners[1]),
-            roof.over(simd, corners[2]),
+    pub fn beside<S: Simd>(&self, simd: S, open: Lanes, level: Lanes, best: &mut Best) -> Lanes {
+        let held = [
+            self.slots(simd, best.held[0]),
+            self.slots(simd, best.held[1]),
         ];
-        let highest = over[0].max(over[1]).max(over[2]);
-        let open = highest.simd_ge(0.0).to_bitmask() & ((1 << self.count) - 1);
-        let nowhere = f32x8::splat(simd, f32::NEG_INFINITY);
-        let mut others = nowhere;
-        let mut has = [mask32x8::splat(simd, false); 2];
-        for (over, places) in over.into_iter().zip(&self.corners) {
-            let places = u32x8::from_slice(simd, places);
-            let held = [places.simd_eq(best.held[0]), places.simd_eq(best.held[1])];
-            has = [has[0] | held[0], has[1] | held[1]];
-            others = others.max((held[0] | held[1]).select(nowhere, over));
+        if held == [0; 2] {
+            return open;
         }
-        let no_higher = open & others.simd_lt(-near.rounding).to_bitmask();
-        for slot in lanes(no_higher & (has[0] & has[1]).to_bitmask()) {
-            best.id = best.id.min(self.ids[slot]);
+        let no_higher = open & !self.having(simd, level & !(held[0] | held[1]));
+        let has = [self.having(simd, held[0]), self.having(simd, held[1])];
+        for slot in lanes(no_higher & has[0] & has[1]) {
+            best.id = best.id.min(self.numbers[slot]);
         }
-        open & !(no_higher & (has[0] | has[1]).to_bitmask())
-    }
-}
-
-/// The range of one coordinate of facets, given by their corners.
-fn range([a, b, c]: [&[f64; FACETS]; 3]) -> Interval {
-    // Facet by facet first, which is vectors; comparisons are one instruction, and nothing here is NaN.
-    let less = |a: f64, b: f64| if a < b { a } else { b };
-    let greater = |a: f64, b: f64| if a > b { a } else { b };
-    let low: [f64; FACETS] = std::array::from_fn(|i| less(less(a[i], b[i]), c[i]));
-    let high: [f64; FACETS] = std::array::from_fn(|i| greater(greater(a[i], b[i]), c[i]));
-    Interval {
-        low: low.into_iter().fold(low[0], less),
-        high: high.into_iter().fold(high[0], greater),
+        open & !(no_higher & (has[0] | has[1]))
     }
 }
 
 impl Leaf for FacetLeaf {
-    type Ceiling = Plane;
+    type Sight = Sight;
+    const NOTHING: Sight = Sight::NOTHING;
 
     #[inline(always)]
-    fn ceiling(cutter: &Cutter, pose: &Pose, place: [f64; 2]) -> Self::Ceiling {
-        Plane::at(cutter, pose, place)
+    fn expect(sight: &mut Sight, cutter: &Cutter, pose: &Pose, place: [f64; 2]) {
+        sight.dome = Dome::at(cutter, pose, place);
     }
 
     #[inline(always)]
@@ -178,58 +170,39 @@ impl Leaf for FacetLeaf {
         &self,
         simd: S,
         points: &[Point],
-        batch: &mut Batch<Self::Ceiling>,
+        batch: &mut Batch<Sight>,
         alive: Lanes,
     ) -> (u64, Lanes) {
         let cutter = batch.cutter;
-        let corners = self.corners_near(simd);
-        let mut nears = [Near::default(); LANES];
-        let mut open = [0; LANES];
         let mut some = 0;
         for lane in lanes(alive) {
             let (pose, best) = (&batch.starts[lane].pose, &mut batch.best[lane]);
-            let [d, y, z] = pose.face(self.middle);
-            let near = Near::new(cutter, pose, [d, y - best.base(), z], self.size);
-            open[lane] = self.open(simd, pose, &near, &batch.ceilings[lane], &corners, best);
-            nears[lane] = near;
-            some |= u64::from(open[lane] != 0) << lane;
+            let sight = &mut batch.sights[lane];
+            sight.look(simd, self, points, cutter, pose, best);
+            some |= u64::from(sight.open != 0) << lane;
         }
         let mut evaluated = 0;
-        let mut bounds = [f32x8::splat(simd, 0.0); LANES];
         for lane in lanes(some) {
-            evaluated += u64::from(open[lane].count_ones());
-            bounds[lane] = simd.piece(
-                #[inline(always)]
-                || facet_bounds(simd, cutter, &nears[lane], &corners),
-            );
-            open[lane] &= bounds[lane].simd_ge(0.0).to_bitmask();
+            let sight = &mut batch.sights[lane];
+            evaluated += u64::from(sight.open.count_ones());
+            sight.bound(simd, self, &batch.best[lane]);
         }
         let mut raised = 0;
         for lane in lanes(some) {
-            let (mut open, bounds, near) = (open[lane], bounds[lane], &nears[lane]);
             let (pose, best) = (&batch.starts[lane].pose, &mut batch.best[lane]);
-            let base = best.base();
+            let sight = &mut batch.sights[lane];
             // The most promising one is solved first; it may rule out the others.
-            while open != 0 {
-                let mut highest = (f32::NEG_INFINITY, 0);
-                for slot in lanes(open) {
-                    if bounds[slot] > highest.0 {
-                        highest = (bounds[slot], slot);
-                    }
-                }
-                let (bound, slot) = highest;
-                if f64::from(bound) < best.height - base {
-                    break;
-                }
-                open &= !(1 << slot);
-                let margin = f64::from(near.rounding);
-                if self.solve(points, cutter, pose, slot, margin, best) {
+            while let Some(slot) = sight.most_promising(best) {
+                sight.open &= !(1 << slot);
+                if self.solve(points, cutter, pose, slot, best) {
                     raised |= 1 << lane;
                     let [d, _, z] = pose.face(best.contact);
-                    let ceiling = Plane::at(cutter, pose, [d, z]);
-                    batch.ceilings[lane] = ceiling;
-                    if open != 0 {
-                        open &= self.open(simd, pose, near, &ceiling, &corners, best);
+                    sight.dome = Dome::at(cutter, pose, [d, z]);
+                    let left = sight.open;
+                    if left != 0 {
+                        sight.look(simd, self, points, cutter, pose, best);
+                        sight.open &= left;
+                        sight.bound(simd, self, best);
                     }
                 }
             }
@@ -255,12 +228,13 @@ mod tests {
         starts: &[Start],
     ) -> Best {
         let mut best = [Best::above(f64::NEG_INFINITY); LANES];
-        let ceiling = FacetLeaf::ceiling(cutter, &starts[1].pose, starts[1].place);
+        let mut sights = [Sight::NOTHING; LANES];
+        FacetLeaf::expect(&mut sights[1], cutter, &starts[1].pose, starts[1].place);
         let mut batch = Batch {
             cutter,
             starts,
             best: &mut best,
-            ceilings: [ceiling; LANES],
+            sights,
         };
         with_simd!(level.token(), simd => leaf.search(simd, points, &mut batch, 2));
         best[1]
@@ -270,7 +244,7 @@ mod tests {
     #[derive(Debug)]
     struct Pyramid {
         points: Vec<Point>,
-        facets: Vec<([u32; 3], u64)>,
+        facets: Vec<([u8; 3], u64)>,
     }
 
     impl Pyramid {
@@ -283,14 +257,19 @@ mod tests {
             let mut points = vec![apex];
             points.extend(feet.iter().enumerate().map(foot));
             let side = |k: usize| {
-                let mut corners = [0, 1 + k as u32, 1 + (k as u32 + 1) % 6];
+                let mut corners = [0, 1 + k as u8, 1 + (k as u8 + 1) % 6];
                 corners.rotate_left(turned[k]);
-                (corners, order[k])
+                // Of several rows.
+                (corners, order[k] << 31)
             };
             Self {
                 points,
                 facets: (0..6).map(side).collect(),
             }
+        }
+
+        fn leaf(&self) -> FacetLeaf {
+            FacetLeaf::new(&self.points, &[0, 1, 2, 3, 4, 5, 6], &self.facets)
         }
     }
 
@@ -330,10 +309,10 @@ mod tests {
             ][which].clone().expect("valid");
             let starts = [at(0.0), at(x)];
             let Pyramid { points, facets } = &pyramid;
-            let leaf = FacetLeaf::new(points, facets);
+            let leaf = pyramid.leaf();
             let mut brute = Best::above(f64::NEG_INFINITY);
             for &(corners, id) in facets {
-                let corners = corners.map(|c| points[c as usize]);
+                let corners = corners.map(|c| points[usize::from(c)]);
                 if let Some(touch) = touch_facet(&cutter, &starts[1].pose, corners) {
                     brute.raise(touch, id);
                 }
@@ -356,21 +335,20 @@ mod tests {
             &[0; 6],
         );
         let cutter = Cutter::torus(40.0, 8.0).expect("valid");
-        let leaf = FacetLeaf::new(&pyramid.points, &pyramid.facets);
+        let leaf = pyramid.leaf();
         for level in Level::available() {
             let mut best = search(level, &leaf, &pyramid.points, &cutter, &[at(0.0), at(0.01)]);
             assert_eq!((best.id, best.held), (0, [0; 2]));
             let pose = at(0.01).pose;
-            let [d, y, z] = pose.face(leaf.middle);
-            let near = Near::new(&cutter, &pose, [d, y - best.base(), z], leaf.size);
             let [d, _, z] = pose.face(best.contact);
-            let ceiling = Plane::at(&cutter, &pose, [d, z]);
+            let mut sight = Sight::NOTHING;
+            FacetLeaf::expect(&mut sight, &cutter, &pose, [d, z]);
             best.id = 7;
-            let open = with_simd!(level.token(), simd => {
-                let corners = leaf.corners_near(simd);
-                leaf.open(simd, &pose, &near, &ceiling, &corners, &mut best)
+            let points = &pyramid.points;
+            with_simd!(level.token(), simd => {
+                sight.look(simd, &leaf, points, &cutter, &pose, &mut best);
             });
-            assert_eq!((open, best.id), (0, 0), "{level}");
+            assert_eq!((sight.open, best.id), (0, 0), "{level}");
         }
     }
 }

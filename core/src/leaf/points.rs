@@ -58,17 +58,18 @@ impl PointLeaf {
 
 impl Leaf for PointLeaf {
     /// Evaluating a point costs hardly more than ruling it out.
-    type Ceiling = ();
+    type Sight = ();
+    const NOTHING: () = ();
 
     #[inline(always)]
-    fn ceiling(_: &Cutter, _: &Pose, _: [f64; 2]) -> Self::Ceiling {}
+    fn expect((): &mut (), _: &Cutter, _: &Pose, _: [f64; 2]) {}
 
     #[inline(always)]
     fn search<S: Set>(
         &self,
         simd: S,
         _: &[Point],
-        batch: &mut Batch<Self::Ceiling>,
+        batch: &mut Batch<()>,
         alive: Lanes,
     ) -> (u64, Lanes) {
         let nothing = f64x8::splat(simd, f64::NEG_INFINITY);
