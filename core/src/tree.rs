@@ -4,12 +4,12 @@
 //! child is skipped only if its bound lies below the best height found, and of equal heights the lowest
 //! candidate wins, in whatever order they are met.
 
-use std::ops::Range;
+mod build;
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 use rayon::prelude::*;
 
-use crate::blocks::{Block, Bundle, longest_side};
+use crate::blocks::{Block, Bundle};
 use crate::bound::{Frame, Lids, Swing, View, lid_bounds};
 use crate::cutter::Cutter;
 use crate::lanes::{LANES, Lanes, lanes};
@@ -40,9 +40,6 @@ struct Node {
 /// Tells a node from a leaf.
 const INNER: u32 = 1 << 31;
 
-/// Bundles of leaves below which a subtree is built by one thread.
-const ALONE: usize = 32;
-
 impl<L: Leaf> Tree<L> {
     /// Builds the hierarchy, in parallel on the current thread pool: a node over each bundle, and nodes over these.
     pub fn new(
@@ -52,26 +49,20 @@ impl<L: Leaf> Tree<L> {
         fill: impl Fn(&[Point], &Block) -> L + Sync + Send,
         vertices: impl Fn(&Block, &mut dyn FnMut(&[Point])) + Sync + Send,
     ) -> Self {
-        arrange(&mut bundles);
+        build::arrange(&mut bundles);
         let mut firsts = vec![0];
         firsts.extend(bundles.iter().scan(0, |next, bundle| {
             *next += bundle.blocks.len();
             Some(*next)
         }));
         let blocks: Vec<Block> = bundles.into_iter().flat_map(|b| b.blocks).collect();
-        let leaves = blocks.par_iter().with_min_len(ALONE * LANES);
+        let leaves = blocks.par_iter().with_min_len(build::ALONE * LANES);
         let leaves: Vec<L> = leaves.map(|block| fill(&points, block)).collect();
         let vertices = Vertices::of(&blocks, vertices);
-        let build = Build {
-            simd,
-            frame: vertices.frame(),
-            vertices,
-            upper: upper(firsts.len() - 1),
-            firsts,
-        };
+        let frame = vertices.frame();
         Self {
-            frame: build.frame,
-            nodes: build.nodes(),
+            frame,
+            nodes: build::nodes(simd, frame, vertices, firsts),
             leaves,
             points,
         }
@@ -272,142 +263,5 @@ impl Stack {
             }
         }
         None
-    }
-}
-
-/// Bundles of each full child of a node over `bundles`: the greatest power of eight below them.
-fn child_size(bundles: usize) -> usize {
-    let mut size = 1;
-    while size * LANES < bundles {
-        size *= LANES;
-    }
-    size
-}
-
-/// Nodes of a tree over so many bundles, without those of the bundles themselves; all children but the last are full.
-fn upper(bundles: usize) -> usize {
-    if bundles < 2 {
-        return 0;
-    }
-    let size = child_size(bundles);
-    let (full, rest) = (bundles / size, bundles % size);
-    1 + full * upper(size) + upper(rest)
-}
-
-/// Orders bundles so that those of each node lie together.
-fn arrange(bundles: &mut [Bundle]) {
-    let size = child_size(bundles.len());
-    if size > 1 {
-        part(bundles, size);
-    }
-}
-
-/// Parts bundles into children of `size` each, halving along the longest side.
-fn part(bundles: &mut [Bundle], size: usize) {
-    if bundles.len() <= size {
-        return arrange(bundles);
-    }
-    let children = bundles.len().div_ceil(size);
-    let left = children / 2 * size;
-    let axis = longest_side(bundles.iter().map(|b| b.middle));
-    let middle = |b: &Bundle| b.middle[axis];
-    bundles.select_nth_unstable_by(left, |a, b| middle(a).total_cmp(&middle(b)));
-    let (left, right) = bundles.split_at_mut(left);
-    if right.len() < ALONE {
-        part(left, size);
-        part(right, size);
-    } else {
-        rayon::join(|| part(left, size), || part(right, size));
-    }
-}
-
-/// What nodes are built from.
-struct Build {
-    simd: Token,
-    frame: Frame,
-    vertices: Vertices,
-    /// The first leaf of each bundle, and one beyond the last.
-    firsts: Vec<usize>,
-    /// Nodes above those of the bundles, which come after them.
-    upper: usize,
-}
-
-impl Build {
-    fn nodes(&self) -> Vec<Node> {
-        let bundles = self.firsts.len() - 1;
-        let empty = Node {
-            lids: Lids::EMPTY,
-            children: [0; LANES],
-        };
-        let mut nodes = vec![empty; self.upper + bundles];
-        let (upper, low) = nodes.split_at_mut(self.upper);
-        rayon::join(
-            || self.upper(0..bundles, upper, 0),
-            || {
-                let low = low.par_iter_mut().with_min_len(ALONE).enumerate();
-                low.for_each(|(bundle, node)| self.low(bundle, node));
-            },
-        );
-        nodes
-    }
-
-    /// Fills the node of a bundle.
-    fn low(&self, bundle: usize, node: &mut Node) {
-        let leaves = self.firsts[bundle]..self.firsts[bundle + 1];
-        for (lane, leaf) in leaves.enumerate() {
-            node.children[lane] = leaf as u32;
-            self.cover(node, lane, leaf..leaf + 1);
-        }
-    }
-
-    /// Fills the nodes over bundles that are in order; `offset` is the place of the first node.
-    fn upper(&self, bundles: Range<usize>, nodes: &mut [Node], offset: usize) {
-        let size = child_size(bundles.len());
-        let Some((node, mut below)) = nodes.split_first_mut() else {
-            return;
-        };
-        let child = |start: usize| start..bundles.end.min(start + size);
-        let starts = || bundles.clone().step_by(size).enumerate();
-        let mut tasks = Vec::with_capacity(LANES);
-        let mut at = offset + 1;
-        for (lane, start) in starts() {
-            let child = child(start);
-            let (own, rest) = below.split_at_mut(upper(child.len()));
-            below = rest;
-            let place = match own.len() {
-                0 => self.upper + start,
-                _ => at,
-            };
-            node.children[lane] = INNER | place as u32;
-            let nodes = own.len();
-            tasks.push((child, own, at));
-            at += nodes;
-        }
-        let fill = |node: &mut Node| {
-            for (lane, start) in starts() {
-                let Range { start, end } = child(start);
-                self.cover(node, lane, self.firsts[start]..self.firsts[end]);
-            }
-        };
-        if bundles.len() < ALONE {
-            fill(node);
-            for (child, nodes, offset) in tasks {
-                self.upper(child, nodes, offset);
-            }
-        } else {
-            rayon::join(
-                || fill(node),
-                || {
-                    let tasks = tasks.into_par_iter();
-                    tasks.for_each(|(child, nodes, offset)| self.upper(child, nodes, offset));
-                },
-            );
-        }
-    }
-
-    /// Puts a lid around leaves.
-    fn cover(&self, node: &mut Node, lane: usize, leaves: Range<usize>) {
-        let points = self.vertices.under(leaves);
-        with_simd!(self.simd, simd => node.lids.set(simd, lane, &self.frame, points));
     }
 }

@@ -6,10 +6,10 @@
 
 use fearless_simd::{Simd, f32x8, prelude::*};
 
-use super::{Eight, Tangent};
+use super::Eight;
 use crate::contact::Pose;
 use crate::cutter::Cutter;
-use crate::tolerance::BOUND_SLACK;
+use crate::tolerance::{BOUND_SLACK, WELL_WITHIN};
 use crate::vector::{Point, dot};
 
 /// A paraboloid that touches F at one place on the cutter.
@@ -95,6 +95,43 @@ impl Dome {
             off: [off_d as f32, off_w as f32],
             w: [by_d, by_z * pose.sin, by_z * pose.cos].map(|c| c as f32),
             bends: self.bends.map(|b| b as f32),
+        }
+    }
+}
+
+/// The tangent plane of G(d, z) = √(m(d)² − z²).
+struct Tangent {
+    d: f64,
+    z: f64,
+    rise: f64,
+    by_d: f64,
+    by_z: f64,
+}
+
+impl Tangent {
+    /// At the place nearest to `(d, z)` that is well within the reach, where the slopes are finite.
+    #[inline(always)]
+    fn near(cutter: &Cutter, d: f64, z: f64) -> Self {
+        let w = cutter.half_width();
+        let d = d.clamp(-WELL_WITHIN * w, WELL_WITHIN * w);
+        let (m, growth) = match *cutter {
+            Cutter::Torus {
+                major_radius,
+                minor_radius,
+            } => {
+                let root = ((minor_radius - d) * (minor_radius + d)).sqrt();
+                (major_radius + root, -d / root)
+            }
+            Cutter::Cone { radius, slope, .. } => (radius + d * slope, slope),
+        };
+        let z = z.clamp(-WELL_WITHIN * m, WELL_WITHIN * m);
+        let rise = ((m - z) * (m + z)).sqrt();
+        Self {
+            d,
+            z,
+            rise,
+            by_d: m * growth / rise,
+            by_z: -z / rise,
         }
     }
 }
@@ -307,6 +344,31 @@ mod tests {
                     prop_assert!(sagged >= touch.height && plane >= touch.height, "{level}");
                 }
             }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        #[test]
+        fn a_cutter_bends_away_from_its_tangent_planes(
+            places in prop::array::uniform2(prop::array::uniform2(-1.0..1.0_f64)),
+            which in 0..4_usize,
+        ) {
+            let cutter = cutter(which);
+            let [from, to] = places.map(|[d, z]| {
+                let d = d * cutter.half_width();
+                let m = cutter.profile(d).expect("within the width");
+                (d, z * m, m)
+            });
+            let t = Tangent::near(&cutter, from.0, from.1);
+            let (off_d, off_z) = (to.0 - t.d, to.1 - t.z);
+            let plane = t.rise + t.by_d * off_d + t.by_z * off_z;
+            let [by_d, by_z] = cutter.least_bends();
+            let below = (by_d * off_d * off_d + by_z * off_z * off_z) / 2.0;
+            let (_, z, m) = to;
+            let rise = ((m - z) * (m + z)).sqrt();
+            prop_assert!(rise <= plane - below + 1.0e-9, "{rise} over {plane} - {below}");
         }
     }
 }
