@@ -79,9 +79,13 @@ pub(crate) fn point_bundles(rows: &[Row]) -> Vec<Bundle> {
         let points = &run[0].points;
         match &run[0].kind {
             RowKind::Slab { .. } => {
-                let mut numbers: Vec<u32> = (0..points.len() as u32).collect();
-                let fits = |lot: &[u32]| lot.len() <= POINTS;
-                scatter(first, points, &mut numbers, POINTS, &fits, &mut bundles);
+                let scatter = Scatter {
+                    row: first as u32,
+                    middles: points,
+                    full: POINTS,
+                    fits: |_: &[u32]| true,
+                };
+                scatter.cut(&mut bundles);
             }
             RowKind::Isoline { .. } => {
                 let rows = run.len().min(POINT_CUT.block[0]);
@@ -108,17 +112,13 @@ pub(crate) fn facet_bundles(rows: &[Row]) -> Vec<Bundle> {
                     [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
                 };
                 let middles: Vec<Point> = facets.iter().map(middle).collect();
-                let mut numbers: Vec<u32> = (0..facets.len() as u32).collect();
-                let fits =
-                    |lot: &[u32]| lot.len() <= SCATTERED && corners(facets, lot).1 <= VERTICES;
-                scatter(
-                    first,
-                    &middles,
-                    &mut numbers,
-                    SCATTERED,
-                    &fits,
-                    &mut bundles,
-                );
+                let scatter = Scatter {
+                    row: first as u32,
+                    middles: &middles,
+                    full: SCATTERED,
+                    fits: |lot: &[u32]| corners(facets, lot).1 <= VERTICES,
+                };
+                scatter.cut(&mut bundles);
             }
             RowKind::Isoline { .. } => {
                 let cells = [run.len() - 1, points.len().saturating_sub(1)];
@@ -156,57 +156,72 @@ fn tile(first: usize, run: &[Row], size: [usize; 2], cut: Cut, bundles: &mut Vec
     }
 }
 
-/// Halves candidates until the leaves of each lot fit into a bundle; a leaf has `full` candidates at most.
-fn scatter(
-    row: usize,
-    middles: &[Point],
-    numbers: &mut [u32],
+/// Candidates of a row that lie anywhere.
+struct Scatter<'a, F> {
+    row: u32,
+    /// About the middle of each, mm.
+    middles: &'a [Point],
+    /// Most of them in a leaf.
     full: usize,
-    fits: &impl Fn(&[u32]) -> bool,
-    bundles: &mut Vec<Bundle>,
-) {
-    let mut lots = vec![numbers];
-    while let Some(lot) = lots.pop() {
-        if lot.len() <= LANES * full {
-            let mut blocks = Vec::with_capacity(LANES);
-            let mut parts = vec![&mut *lot];
-            while let Some(part) = parts.pop() {
-                if part.is_empty() {
-                    // A row from outside may have nothing in it.
-                } else if fits(part) {
-                    blocks.push(Block::Scattered {
-                        row: row as u32,
-                        numbers: (&*part).into(),
-                    });
-                } else {
-                    parts.extend(halves(middles, part, full));
-                }
-            }
-            if blocks.len() <= LANES {
-                let sum = lot.iter().fold([0.0; 3], |sum, n| {
-                    add_scaled(sum, 1.0, middles[*n as usize])
-                });
-                if !blocks.is_empty() {
-                    let middle = sum.map(|s| s / lot.len() as f64);
-                    bundles.push(Bundle { middle, blocks });
-                }
-                continue;
-            }
-        }
-        lots.extend(halves(middles, lot, full));
-    }
+    /// Whether a leaf has room for these, if they are no more.
+    fits: F,
 }
 
-/// Halves candidates along their longest side, with full leaves on the left if there is more than one.
-fn halves<'a>(middles: &[Point], lot: &'a mut [u32], full: usize) -> [&'a mut [u32]; 2] {
-    let at = |n: &u32| middles[*n as usize];
-    let axis = longest_side(lot.iter().map(at));
-    let half = match lot.len().div_ceil(full) / 2 * full {
-        0 => lot.len() / 2,
-        half => half,
-    };
-    lot.select_nth_unstable_by(half, |a, b| at(a)[axis].total_cmp(&at(b)[axis]));
-    lot.split_at_mut(half).into()
+impl<F: Fn(&[u32]) -> bool> Scatter<'_, F> {
+    /// Halves them until the leaves of each lot make a bundle.
+    fn cut(&self, bundles: &mut Vec<Bundle>) {
+        let mut numbers: Vec<u32> = (0..self.middles.len() as u32).collect();
+        let mut lots = vec![&mut numbers[..]];
+        while let Some(lot) = lots.pop() {
+            let blocks = match lot.len() <= LANES * self.full {
+                true => self.leaves(lot),
+                false => Vec::new(),
+            };
+            if (1..=LANES).contains(&blocks.len()) {
+                let add = |sum, n: &u32| add_scaled(sum, 1.0, self.middle(*n));
+                let sum = lot.iter().fold([0.0; 3], add);
+                bundles.push(Bundle {
+                    middle: sum.map(|s| s / lot.len() as f64),
+                    blocks,
+                });
+            } else if !lot.is_empty() {
+                lots.extend(self.halves(lot));
+            }
+        }
+    }
+
+    /// Halves a lot until each part fits into a leaf. A row from outside may have nothing in it.
+    fn leaves(&self, lot: &mut [u32]) -> Vec<Block> {
+        let mut blocks = Vec::with_capacity(LANES);
+        let mut parts = vec![lot];
+        while let Some(part) = parts.pop() {
+            if part.len() > self.full || !(self.fits)(part) {
+                parts.extend(self.halves(part));
+            } else if !part.is_empty() {
+                blocks.push(Block::Scattered {
+                    row: self.row,
+                    numbers: (&*part).into(),
+                });
+            }
+        }
+        blocks
+    }
+
+    /// Halves a lot along its longest side, with full leaves on the left if there is more than one.
+    fn halves<'a>(&self, lot: &'a mut [u32]) -> [&'a mut [u32]; 2] {
+        let axis = longest_side(lot.iter().map(|&n| self.middle(n)));
+        let half = match lot.len().div_ceil(self.full) / 2 * self.full {
+            0 => lot.len() / 2,
+            half => half,
+        };
+        let along = |n: &u32| self.middle(*n)[axis];
+        lot.select_nth_unstable_by(half, |a, b| along(a).total_cmp(&along(b)));
+        lot.split_at_mut(half).into()
+    }
+
+    fn middle(&self, number: u32) -> Point {
+        self.middles[number as usize]
+    }
 }
 
 /// The vertices of some facets, each once, and how many they are; no more than one too many for a leaf.
@@ -356,6 +371,82 @@ mod tests {
             };
             assert!(point_bundles(std::slice::from_ref(&row)).is_empty());
             assert!(facet_bundles(&[row]).is_empty());
+        }
+    }
+
+    /// Of each row, how often each of its points or cells is in a block.
+    fn counts(bundles: &[Bundle], rows: usize, columns: usize) -> Vec<Vec<u32>> {
+        let mut counts = vec![vec![0; columns]; rows];
+        for bundle in bundles {
+            assert!((1..=LANES).contains(&bundle.blocks.len()));
+            for block in &bundle.blocks {
+                match block {
+                    Block::Tile { rows, columns } => {
+                        for row in rows.clone() {
+                            for column in columns.clone() {
+                                counts[row as usize][column as usize] += 1;
+                            }
+                        }
+                    }
+                    Block::Scattered { row, numbers } => {
+                        for &n in numbers {
+                            counts[*row as usize][n as usize] += 1;
+                        }
+                    }
+                }
+            }
+        }
+        counts
+    }
+
+    #[test]
+    fn each_candidate_of_a_grid_is_in_one_block() {
+        for high in 1..12 {
+            for wide in 1..40 {
+                let row = |i: u32| Row {
+                    id: i,
+                    points: vec![[f64::from(i), 1.0, 0.0]; wide],
+                    kind: RowKind::Isoline {
+                        joins_next: i + 1 < high,
+                    },
+                };
+                let rows: Vec<Row> = (0..high).map(row).collect();
+                let points = counts(&point_bundles(&rows), rows.len(), wide);
+                assert!(points.iter().flatten().all(|&n| n == 1), "{high} by {wide}");
+                let cells = counts(&facet_bundles(&rows), rows.len() - 1, wide - 1);
+                assert!(cells.iter().flatten().all(|&n| n == 1), "{high} by {wide}");
+            }
+        }
+    }
+
+    #[test]
+    fn each_candidate_of_a_mesh_is_in_one_block() {
+        for count in [1, 5, 6, 12, 13, 96, 97, 256] {
+            // A strip, and triangles that have nothing in common.
+            for step in [1, 3] {
+                let corners = |i: u32| [0, 1, 2].map(|k| step * i + k);
+                let facets: Vec<[u32; 3]> = (0..count).map(corners).collect();
+                let point = |i: u32| {
+                    let i = f64::from(i);
+                    [i, libm::sin(i), libm::cos(2.0 * i)]
+                };
+                let row = Row {
+                    id: 0,
+                    points: (0..step * count + 2).map(point).collect(),
+                    kind: RowKind::Slab {
+                        facets: facets.clone(),
+                    },
+                };
+                let rows = std::slice::from_ref(&row);
+                let points = counts(&point_bundles(rows), 1, row.points.len());
+                assert!(points.iter().flatten().all(|&n| n == 1), "{count}");
+                let bundles = facet_bundles(rows);
+                let blocks = counts(&bundles, 1, facets.len());
+                assert!(blocks.iter().flatten().all(|&n| n == 1), "{count}");
+                for block in bundles.iter().flat_map(|b| &b.blocks) {
+                    facet_leaf(rows, &[0], &row.points, block);
+                }
+            }
         }
     }
 }
