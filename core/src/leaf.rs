@@ -99,6 +99,8 @@ pub(crate) struct Batch<'a, S> {
     pub best: &'a mut [Best; LANES],
     /// What each of them sees of a leaf.
     pub sights: [S; LANES],
+    /// Whether a height that rounding may have put above everything is taken for a floor.
+    pub floors: bool,
 }
 
 /// A few candidates.

@@ -100,41 +100,42 @@ impl<L: Leaf> Tree<L> {
             best[lane].height = start.floor;
             active |= 1 << lane;
         }
+        let mut batch = Batch {
+            cutter,
+            starts,
+            best: &mut best,
+            sights: [L::NOTHING; LANES],
+            floors: true,
+        };
         while active != 0 {
-            self.raise(simd, cutter, starts, active, &mut best, counters);
+            self.raise(simd, &mut batch, active, counters);
             active = 0;
-            for (lane, best) in best.iter_mut().enumerate() {
+            for (lane, best) in batch.best.iter_mut().enumerate() {
                 if best.id == Best::NOBODY && best.height > f64::NEG_INFINITY {
                     // Rounding has put the floor above everything.
                     best.height = f64::NEG_INFINITY;
                     active |= 1 << lane;
                 }
             }
+            batch.floors = false;
         }
         best
     }
 
-    /// Raises the `best` of each active position to the highest of all candidates.
+    /// Raises the best of each active position to the highest of all candidates.
     #[inline(always)]
     fn raise<S: Set>(
         &self,
         simd: S,
-        cutter: &Cutter,
-        starts: &[Start],
+        batch: &mut Batch<L::Sight>,
         active: Lanes,
-        best: &mut [Best; LANES],
         counters: &mut Counters,
     ) {
+        let (cutter, starts) = (batch.cutter, batch.starts);
         let Some(first) = starts.first().filter(|_| !self.nodes.is_empty()) else {
             return;
         };
         let mut views = [View::new(&self.frame, cutter, &first.pose, first.place); LANES];
-        let mut batch = Batch {
-            cutter,
-            starts,
-            best,
-            sights: [L::NOTHING; LANES],
-        };
         let mut heights = [f32::INFINITY; LANES];
         for lane in lanes(active) {
             let start = &starts[lane];
@@ -151,7 +152,7 @@ impl<L: Leaf> Tree<L> {
             let alive = alive & active;
             if child & INNER == 0 {
                 let leaf = &self.leaves[child as usize];
-                let (evaluated, raised) = leaf.search(simd, &self.points, &mut batch, alive);
+                let (evaluated, raised) = leaf.search(simd, &self.points, batch, alive);
                 counters.evaluations += evaluated;
                 for lane in lanes(raised) {
                     let best = &batch.best[lane];

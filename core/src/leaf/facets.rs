@@ -178,6 +178,7 @@ impl Leaf for FacetLeaf {
         for lane in lanes(alive) {
             let (pose, best) = (&batch.starts[lane].pose, &mut batch.best[lane]);
             let sight = &mut batch.sights[lane];
+            let points = Some(points).filter(|_| batch.floors);
             sight.look(simd, self, points, cutter, pose, best);
             some |= u64::from(sight.open != 0) << lane;
         }
@@ -200,7 +201,7 @@ impl Leaf for FacetLeaf {
                     sight.dome = Dome::at(cutter, pose, [d, z]);
                     let left = sight.open;
                     if left != 0 {
-                        sight.look(simd, self, points, cutter, pose, best);
+                        sight.look(simd, self, None, cutter, pose, best);
                         sight.open &= left;
                         sight.bound(simd, self, best);
                     }
@@ -226,6 +227,7 @@ mod tests {
         points: &[Point],
         cutter: &Cutter,
         starts: &[Start],
+        floors: bool,
     ) -> Best {
         let mut best = [Best::above(f64::NEG_INFINITY); LANES];
         let mut sights = [Sight::NOTHING; LANES];
@@ -235,6 +237,7 @@ mod tests {
             starts,
             best: &mut best,
             sights,
+            floors,
         };
         with_simd!(level.token(), simd => leaf.search(simd, points, &mut batch, 2));
         best[1]
@@ -318,9 +321,11 @@ mod tests {
                 }
             }
             for level in Level::available() {
-                let best = search(level, &leaf, points, &cutter, &starts);
-                prop_assert_eq!(best.height.to_bits(), brute.height.to_bits(), "{}", level);
-                prop_assert_eq!((best.id, best.contact), (brute.id, brute.contact), "{}", level);
+                for floors in [true, false] {
+                    let best = search(level, &leaf, points, &cutter, &starts, floors);
+                    prop_assert_eq!(best.height.to_bits(), brute.height.to_bits(), "{}", level);
+                    prop_assert_eq!((best.id, best.contact), (brute.id, brute.contact), "{}", level);
+                }
             }
         }
     }
@@ -337,7 +342,8 @@ mod tests {
         let cutter = Cutter::torus(40.0, 8.0).expect("valid");
         let leaf = pyramid.leaf();
         for level in Level::available() {
-            let mut best = search(level, &leaf, &pyramid.points, &cutter, &[at(0.0), at(0.01)]);
+            let starts = [at(0.0), at(0.01)];
+            let mut best = search(level, &leaf, &pyramid.points, &cutter, &starts, true);
             assert_eq!((best.id, best.held), (0, [0; 2]));
             let pose = at(0.01).pose;
             let [d, _, z] = pose.face(best.contact);
@@ -346,7 +352,7 @@ mod tests {
             best.id = 7;
             let points = &pyramid.points;
             with_simd!(level.token(), simd => {
-                sight.look(simd, &leaf, points, &cutter, &pose, &mut best);
+                sight.look(simd, &leaf, Some(points), &cutter, &pose, &mut best);
             });
             assert_eq!((sight.open, best.id), (0, 0), "{level}");
         }

@@ -37,13 +37,14 @@ impl Sight {
         bounds: [0.0; FACETS],
     };
 
-    /// Looks at the vertices: under a dome that touches F where `best` is, or is expected.
+    /// Looks at the vertices: under a dome that touches F where `best` is, or is expected. Given all points, the
+    /// highest of them is a floor.
     #[inline(always)]
     pub fn look<S: Set>(
         &mut self,
         simd: S,
         leaf: &FacetLeaf,
-        points: &[Point],
+        points: Option<&[Point]>,
         cutter: &Cutter,
         pose: &Pose,
         best: &mut Best,
@@ -59,7 +60,7 @@ impl Sight {
             return;
         }
         let little = margin(cutter, pose, self.base) as f32;
-        if top > little {
+        if let Some(points) = points.filter(|_| top > little) {
             // The facets at a vertex are no lower than it is.
             let tops = both(low.height.simd_ge(top), high.height.simd_ge(top));
             let vertex = leaf.places[tops.trailing_zeros() as usize % VERTICES];
