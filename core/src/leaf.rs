@@ -106,9 +106,7 @@ pub(crate) struct Batch<'a, S> {
 /// A few candidates.
 pub(crate) trait Leaf: Sync + Send {
     /// What a position sees of it, before any candidate is evaluated.
-    type Sight: Copy;
-    /// Nothing seen.
-    const NOTHING: Self::Sight;
+    type Sight: Copy + Default;
 
     /// The highest touch is expected at a place on the cutter, `(d, z)`.
     fn expect(sight: &mut Self::Sight, cutter: &Cutter, pose: &Pose, place: [f64; 2]);

@@ -104,7 +104,7 @@ impl<L: Leaf> Tree<L> {
             cutter,
             starts,
             best: &mut best,
-            sights: [L::NOTHING; LANES],
+            sights: [L::Sight::default(); LANES],
             floors: true,
         };
         while active != 0 {

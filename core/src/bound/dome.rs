@@ -18,7 +18,7 @@ use crate::vector::{Point, dot};
 /// G = √(m² − z²) lies below its own, T = (m₀·m − z₀·z)/G₀, by (T² − G²)/(T + G). There T² − G² is the square
 /// of w = (m₀·ζ − z₀·m′·δ)/G₀, G is no more than the largest radius, and T no more than (m₀ + |z₀|)/G₀ times that.
 /// For a torus w is ζ.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Dome {
     /// How the tangent plane slopes along x, y and z of the part, and its height at the origin, mm.
     slope: Point,
@@ -32,15 +32,6 @@ pub(crate) struct Dome {
 }
 
 impl Dome {
-    /// Of no cutter.
-    pub const NOWHERE: Self = Self {
-        slope: [0.0; 3],
-        height: f64::NEG_INFINITY,
-        at: [0.0; 2],
-        w: [0.0; 2],
-        bends: [0.0; 2],
-    };
-
     /// The place is `(d, z)`.
     #[inline(always)]
     pub fn at(cutter: &Cutter, pose: &Pose, [d, z]: [f64; 2]) -> Self {
@@ -137,7 +128,7 @@ impl Tangent {
 }
 
 /// A [`Dome`] as points around a middle see it, all that rounding may take added to it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct NearDome {
     slope: [f32; 3],
     height: f32,
@@ -157,15 +148,6 @@ pub(crate) struct Spots<S: Simd> {
 }
 
 impl NearDome {
-    /// Below everything.
-    pub const NOWHERE: Self = Self {
-        slope: [0.0; 3],
-        height: f32::NEG_INFINITY,
-        off: [0.0; 2],
-        w: [0.0; 3],
-        bends: [0.0; 2],
-    };
-
     /// Whether it is level along one direction, as a cone is along its rulings: so it does not fall off beyond the
     /// cutter's ends, and over a facet it is highest on an edge.
     #[inline(always)]

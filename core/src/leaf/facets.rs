@@ -158,7 +158,6 @@ impl FacetLeaf {
 
 impl Leaf for FacetLeaf {
     type Sight = Sight;
-    const NOTHING: Sight = Sight::NOTHING;
 
     #[inline(always)]
     fn expect(sight: &mut Sight, cutter: &Cutter, pose: &Pose, place: [f64; 2]) {
@@ -230,7 +229,7 @@ mod tests {
         floors: bool,
     ) -> Best {
         let mut best = [Best::above(f64::NEG_INFINITY); LANES];
-        let mut sights = [Sight::NOTHING; LANES];
+        let mut sights = [Sight::default(); LANES];
         FacetLeaf::expect(&mut sights[1], cutter, &starts[1].pose, starts[1].place);
         let mut batch = Batch {
             cutter,
@@ -347,7 +346,7 @@ mod tests {
             assert_eq!((best.id, best.held), (0, [0; 2]));
             let pose = at(0.01).pose;
             let [d, _, z] = pose.face(best.contact);
-            let mut sight = Sight::NOTHING;
+            let mut sight = Sight::default();
             FacetLeaf::expect(&mut sight, &cutter, &pose, [d, z]);
             best.id = 7;
             let points = &pyramid.points;

@@ -59,7 +59,6 @@ impl PointLeaf {
 impl Leaf for PointLeaf {
     /// Evaluating a point costs hardly more than ruling it out.
     type Sight = ();
-    const NOTHING: () = ();
 
     #[inline(always)]
     fn expect((): &mut (), _: &Cutter, _: &Pose, _: [f64; 2]) {}

@@ -12,7 +12,7 @@ use crate::simd::Set;
 use crate::vector::Point;
 
 /// The facets of one leaf under a dome.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Sight {
     /// It touches F where the highest touch is, or is expected.
     pub dome: Dome,
@@ -28,15 +28,6 @@ pub(crate) struct Sight {
 }
 
 impl Sight {
-    pub const NOTHING: Self = Self {
-        dome: Dome::NOWHERE,
-        near: NearDome::NOWHERE,
-        base: 0.0,
-        spots: [[0.0; VERTICES]; 3],
-        open: 0,
-        bounds: [0.0; FACETS],
-    };
-
     /// Looks at the vertices: under a dome that touches F where `best` is, or is expected. Given all points, the
     /// highest of them is a floor.
     #[inline(always)]
