@@ -14,7 +14,7 @@ use fearless_simd::{Simd, f32x8, prelude::*};
 
 use crate::lanes::LANES;
 
-pub(crate) use dome::{Dome, NearDome, Spots};
+pub(crate) use dome::{Dome, NearDome, Spots, sixteen};
 pub(crate) use lid::{Frame, Lids, Swing, View, lid_bounds};
 
 /// Eight points or vectors.

@@ -4,7 +4,7 @@
 //! are the same bits. Nothing is multiplied and added in one step, and nothing depends on the other
 //! lanes.
 
-use fearless_simd::{Simd, f32x8, f64x8, mask32x8, mask64x8, prelude::*};
+use fearless_simd::{Simd, f32x8, f64x8, mask64x8, prelude::*};
 
 use crate::contact::Pose;
 use crate::cutter::Cutter;
@@ -26,12 +26,6 @@ pub(crate) fn lanes(mut some: Lanes) -> impl Iterator<Item = usize> {
             lane
         },
     )
-}
-
-/// The lanes of two vectors side by side.
-#[inline(always)]
-pub(crate) fn both<S: Simd>(low: mask32x8<S>, high: mask32x8<S>) -> Lanes {
-    low.to_bitmask() | high.to_bitmask() << LANES
 }
 
 /// m(d) of eight distances, and which of them are within the width.

@@ -1,12 +1,11 @@
-//! Paraboloids that F nowhere exceeds, and how high they are over facets, eight at a time.
+//! Paraboloids that F nowhere exceeds, and how high they are over facets, sixteen at a time.
 //!
 //! F lies below its tangent plane by no less than the cutter bends, so a paraboloid that bends as much bounds it
 //! far closer than the plane does. It is seen from the middle of a leaf, and heights are counted from
 //! about where they matter: so single precision loses no more than a share of the leaf's size.
 
-use fearless_simd::{Simd, f32x8, prelude::*};
+use fearless_simd::{Simd, f32x16, prelude::*};
 
-use super::Eight;
 use crate::contact::Pose;
 use crate::cutter::Cutter;
 use crate::tolerance::{BOUND_SLACK, WELL_WITHIN};
@@ -140,11 +139,21 @@ pub(crate) struct NearDome {
     bends: [f32; 2],
 }
 
-/// Eight points under a dome: how high it is over each, and their δ and w.
+/// Sixteen points.
+#[inline(always)]
+pub(crate) fn sixteen<S: Simd>(simd: S, axes: &[[f32; 16]; 3]) -> [f32x16<S>; 3] {
+    [
+        f32x16::from_slice(simd, &axes[0]),
+        f32x16::from_slice(simd, &axes[1]),
+        f32x16::from_slice(simd, &axes[2]),
+    ]
+}
+
+/// Sixteen points under a dome: how high it is over each, and their δ and w.
 pub(crate) struct Spots<S: Simd> {
-    pub height: f32x8<S>,
-    pub d: f32x8<S>,
-    pub w: f32x8<S>,
+    pub height: f32x16<S>,
+    pub d: f32x16<S>,
+    pub w: f32x16<S>,
 }
 
 impl NearDome {
@@ -155,19 +164,19 @@ impl NearDome {
         self.bends[0] == 0.0
     }
 
-    /// Eight points under it, and how high the tangent plane is over each.
+    /// Sixteen points under it, and how high the tangent plane is over each.
     #[inline(always)]
-    pub fn over<S: Simd>(&self, simd: S, [x, y, z]: Eight<S>) -> (Spots<S>, f32x8<S>) {
+    pub fn over<S: Simd>(&self, simd: S, [x, y, z]: [f32x16<S>; 3]) -> (Spots<S>, f32x16<S>) {
         let [a, b, c] = self.slope;
         let plane = x.mul_add(
             a,
-            y.mul_add(b, z.mul_add(c, f32x8::splat(simd, self.height))),
+            y.mul_add(b, z.mul_add(c, f32x16::splat(simd, self.height))),
         );
         let d = x + self.off[0];
         let [a, b, c] = self.w;
         let w = x.mul_add(
             a,
-            y.mul_add(b, z.mul_add(c, f32x8::splat(simd, self.off[1]))),
+            y.mul_add(b, z.mul_add(c, f32x16::splat(simd, self.off[1]))),
         );
         let height = plane - self.bend(d, w);
         (Spots { height, d, w }, plane)
@@ -175,7 +184,7 @@ impl NearDome {
 
     /// How far it bends down over a way.
     #[inline(always)]
-    fn bend<S: Simd>(&self, d: f32x8<S>, w: f32x8<S>) -> f32x8<S> {
+    fn bend<S: Simd>(&self, d: f32x16<S>, w: f32x16<S>) -> f32x16<S> {
         (d * self.bends[0]).mul_add(d, w * w * self.bends[1])
     }
 
@@ -190,9 +199,9 @@ impl NearDome {
         SAG * (self.bends[0] * along + self.bends[1] * w)
     }
 
-    /// How high it is over each of eight facets at most, given their corners.
+    /// How high it is over each of sixteen facets at most, given their corners.
     #[inline(always)]
-    pub fn summits<S: Simd>(&self, simd: S, [a, b, c]: &[Spots<S>; 3]) -> f32x8<S> {
+    pub fn summits<S: Simd>(&self, simd: S, [a, b, c]: &[Spots<S>; 3]) -> f32x16<S> {
         let ab = self.bend(b.d - a.d, b.w - a.w);
         let ac = self.bend(c.d - a.d, c.w - a.w);
         let bc = self.bend(c.d - b.d, c.w - b.w);
@@ -207,7 +216,7 @@ impl NearDome {
         let (two_ab, two_ac) = (ab + ab, ac + ac);
         let square = two_ab * two_ac;
         let whole = square - k * k;
-        let share = f32x8::splat(simd, 1.0) / whole;
+        let share = f32x16::splat(simd, 1.0) / whole;
         let s = two_ac.mul_sub(g, k * h) * share;
         let t = two_ab.mul_sub(h, k * g) * share;
         let along_s = s * (-ab).mul_add(s, g);
@@ -231,14 +240,13 @@ const SAG: f32 = 0.334;
 
 /// The most of a parabola between its values at two ends, if it bends down by `bend` from one end to the other.
 #[inline(always)]
-fn crest<S: Simd>(a: f32x8<S>, b: f32x8<S>, bend: f32x8<S>) -> f32x8<S> {
+fn crest<S: Simd>(a: f32x16<S>, b: f32x16<S>, bend: f32x16<S>) -> f32x16<S> {
     let rise = (bend - (a - b).abs()).max(0.0);
     rise * rise / (bend * 4.0).max(1.0e-30) + a.max(b)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::load;
     use super::super::tests::{cutter, pose};
     use super::*;
     use crate::contact::touch_facet;
@@ -246,18 +254,18 @@ mod tests {
     use crate::vector::{add_scaled, sub};
     use proptest::prelude::*;
 
-    /// Bounds of eight facets: by their summits, by their corners and a sag, and by the plane.
+    /// Bounds of sixteen facets: by their summits, by their corners and a sag, and by the plane.
     #[inline(always)]
     fn bounds<S: Set>(
         simd: S,
         near: &NearDome,
-        corners: &[[[f32; 8]; 3]; 3],
+        corners: &[[[f32; 16]; 3]; 3],
         edge: [f32; 2],
-    ) -> [[f32; 8]; 3] {
+    ) -> [[f32; 16]; 3] {
         let [(a, over_a), (b, over_b), (c, over_c)] = [
-            near.over(simd, load(simd, &corners[0])),
-            near.over(simd, load(simd, &corners[1])),
-            near.over(simd, load(simd, &corners[2])),
+            near.over(simd, sixteen(simd, &corners[0])),
+            near.over(simd, sixteen(simd, &corners[1])),
+            near.over(simd, sixteen(simd, &corners[2])),
         ];
         let highest = a.height.max(b.height).max(c.height);
         let sagged = highest + near.sag(edge);
@@ -277,7 +285,7 @@ mod tests {
                 .expect("in reach")
                 .height;
             let near = dome.near(&pose, corners[0], 0.4, touch);
-            let lanes = corners.map(|p| sub(p, corners[0]).map(|c| [c as f32; 8]));
+            let lanes = corners.map(|p| sub(p, corners[0]).map(|c| [c as f32; 16]));
             for level in Level::available() {
                 let all =
                     with_simd!(level.token(), simd => bounds(simd, &near, &lanes, [0.16, 0.16]));
@@ -314,7 +322,7 @@ mod tests {
             });
             let all = corners.map(|p| sub(p, middle).map(|c| c as f32));
             let size = all.iter().flatten().fold(0.0, |a: f32, c| a.max(c.abs()));
-            let lanes = all.map(|p| p.map(|c| [c; 8]));
+            let lanes = all.map(|p| p.map(|c| [c; 16]));
             // Where it is touched, and anywhere.
             let [d, _, z] = pose.face(touch.contact);
             for place in [[d, z], place] {

@@ -1,13 +1,13 @@
 //! Leaves of facets: those of two by four cells of a grid, or a handful of a mesh's that share vertices.
 
-use fearless_simd::{Simd, f32x8, prelude::*, u32x8};
+use fearless_simd::{Simd, f32x16, prelude::*, u8x64, u32x16};
 
 use super::sight::Sight;
 use super::{Batch, Best, Leaf, margin};
-use crate::bound::Dome;
+use crate::bound::{Dome, sixteen};
 use crate::contact::{Pose, Spot, height_well_within, touch_seen};
 use crate::cutter::Cutter;
-use crate::lanes::{LANES, Lanes, both, lanes};
+use crate::lanes::{LANES, Lanes, lanes};
 use crate::simd::Set;
 use crate::vector::{Interval, Point};
 
@@ -30,8 +30,8 @@ pub(crate) struct FacetLeaf {
     masks: [u32; FACETS],
     /// The vertices as places among all points, whose coordinates are what is solved exactly.
     pub places: [u32; VERTICES],
-    /// The corners of each facet, as slots of vertices.
-    pub corners: [[u8; 3]; FACETS],
+    /// The first, second and third corner of each facet: the four bytes of a vertex of sixteen.
+    corners: [[[u8; 4]; FACETS]; 3],
     numbers: [u64; FACETS],
 }
 
@@ -46,7 +46,7 @@ impl FacetLeaf {
             edge: [0.0; 2],
             masks: [0; FACETS],
             places: [vertices[0]; VERTICES],
-            corners: [[0; 3]; FACETS],
+            corners: [[bytes(0); FACETS]; 3],
             numbers: [Best::NOBODY; FACETS],
         };
         leaf.places[..vertices.len()].copy_from_slice(vertices);
@@ -58,7 +58,9 @@ impl FacetLeaf {
             leaf.size = leaf.size.max((high - leaf.middle[k]) as f32);
         }
         for (slot, &(corners, number)) in facets.iter().enumerate() {
-            leaf.corners[slot] = corners;
+            for (all, corner) in leaf.corners.iter_mut().zip(corners) {
+                all[slot] = bytes(corner);
+            }
             leaf.masks[slot] = corners.iter().fold(0, |mask, c| mask | 1 << c);
             leaf.numbers[slot] = number;
             for k in 0..3 {
@@ -70,30 +72,36 @@ impl FacetLeaf {
         leaf
     }
 
-    /// Eight of the vertices.
+    /// The vertices.
     #[inline(always)]
-    pub fn eight<S: Simd>(&self, simd: S, first: usize) -> [f32x8<S>; 3] {
-        [
-            f32x8::from_slice(simd, &self.near[0][first..first + LANES]),
-            f32x8::from_slice(simd, &self.near[1][first..first + LANES]),
-            f32x8::from_slice(simd, &self.near[2][first..first + LANES]),
-        ]
+    pub fn vertices<S: Simd>(&self, simd: S) -> [f32x16<S>; 3] {
+        sixteen(simd, &self.near)
+    }
+
+    /// What there is of the first, second or third corner of each facet, given that of each vertex.
+    #[inline(always)]
+    pub fn at_corners<S: Simd>(&self, simd: S, which: usize, vertices: f32x16<S>) -> f32x16<S> {
+        vertices.swizzle_dyn(u8x64::from_slice(simd, self.corners[which].as_flattened()))
     }
 
     /// The facets that have any of some vertices.
     #[inline(always)]
     pub fn having<S: Simd>(&self, simd: S, vertices: Lanes) -> Lanes {
-        let low = u32x8::from_slice(simd, &self.masks[..LANES]) & vertices as u32;
-        let high = u32x8::from_slice(simd, &self.masks[LANES..]) & vertices as u32;
-        both(low.simd_gt(0), high.simd_gt(0))
+        let masks = u32x16::from_slice(simd, &self.masks);
+        (masks & vertices as u32).simd_gt(0).to_bitmask()
     }
 
     /// The slots of a vertex.
     #[inline(always)]
     fn slots<S: Simd>(&self, simd: S, vertex: u32) -> Lanes {
-        let low = u32x8::from_slice(simd, &self.places[..LANES]);
-        let high = u32x8::from_slice(simd, &self.places[LANES..]);
-        both(low.simd_eq(vertex), high.simd_eq(vertex))
+        let places = u32x16::from_slice(simd, &self.places);
+        places.simd_eq(vertex).to_bitmask()
+    }
+
+    /// The corners of the facet in a slot, as slots of vertices.
+    #[inline(always)]
+    fn corners(&self, slot: usize) -> [usize; 3] {
+        [0, 1, 2].map(|k| usize::from(self.corners[k][slot][0] / 4))
     }
 
     /// Raises `best` to the facet in a slot; returns whether that did.
@@ -106,7 +114,7 @@ impl FacetLeaf {
         slot: usize,
         best: &mut Best,
     ) -> bool {
-        let places = self.corners[slot].map(|c| self.places[usize::from(c)]);
+        let places = self.corners(slot).map(|c| self.places[c]);
         let corners = places.map(|place| points[place as usize]);
         let seen = [
             pose.face(corners[0]),
@@ -154,6 +162,11 @@ impl FacetLeaf {
         }
         open & !(no_higher & (has[0] | has[1]))
     }
+}
+
+/// The bytes of a number among sixteen.
+fn bytes(slot: u8) -> [u8; 4] {
+    [0, 1, 2, 3].map(|byte| 4 * slot + byte)
 }
 
 impl Leaf for FacetLeaf {

@@ -1,13 +1,13 @@
 //! What a position sees of a leaf of facets: which of them may be higher than the highest it has found.
 
-use fearless_simd::{Simd, f32x8, prelude::*};
+use fearless_simd::{f32x16, prelude::*};
 
 use super::facets::{FACETS, FacetLeaf, VERTICES};
 use super::{Best, margin};
-use crate::bound::{Dome, NearDome, Spots};
+use crate::bound::{Dome, NearDome, Spots, sixteen};
 use crate::contact::{Pose, least_height};
 use crate::cutter::Cutter;
-use crate::lanes::{LANES, Lanes, both, lanes};
+use crate::lanes::{Lanes, lanes};
 use crate::simd::Set;
 use crate::vector::Point;
 
@@ -43,17 +43,16 @@ impl Sight {
         self.open = 0;
         self.base = best.base();
         self.near = self.dome.near(pose, leaf.middle, leaf.size, self.base);
-        let (low, over_low) = self.near.over(simd, leaf.eight(simd, 0));
-        let (high, over_high) = self.near.over(simd, leaf.eight(simd, LANES));
+        let (under, plane) = self.near.over(simd, leaf.vertices(simd));
         let sag = self.near.sag(leaf.edge);
-        let top = low.height.max(high.height).reduce_max();
+        let top = under.height.reduce_max();
         if top < -sag {
             return;
         }
         let little = margin(cutter, pose, self.base) as f32;
         if let Some(points) = points.filter(|_| top > little) {
             // The facets at a vertex are no lower than it is.
-            let tops = both(low.height.simd_ge(top), high.height.simd_ge(top));
+            let tops = under.height.simd_ge(top).to_bitmask();
             let vertex = leaf.places[tops.trailing_zeros() as usize % VERTICES];
             let floor = least_height(cutter, pose, points[vertex as usize]);
             if floor > best.height {
@@ -61,32 +60,23 @@ impl Sight {
             }
         }
         let above = self.above_base(best.height);
-        let least = above - sag;
-        let higher = both(low.height.simd_ge(least), high.height.simd_ge(least));
-        let over = both(over_low.simd_ge(above), over_high.simd_ge(above));
+        let higher = under.height.simd_ge(above - sag).to_bitmask();
+        let over = plane.simd_ge(above).to_bitmask();
         self.open = leaf.having(simd, higher) & leaf.having(simd, over);
         if self.near.is_level() {
             let off = pose.x - leaf.middle[0];
             let reach = cutter.half_width();
             let reach = reach + 1.0e-6 * (reach + off.abs());
             let (from, to) = ((off - reach) as f32, (off + reach) as f32);
-            let [low, high] = [leaf.eight(simd, 0)[0], leaf.eight(simd, LANES)[0]];
-            self.open &= leaf.having(simd, both(low.simd_ge(from), high.simd_ge(from)));
-            self.open &= leaf.having(simd, both(low.simd_le(to), high.simd_le(to)));
+            let [x, ..] = leaf.vertices(simd);
+            self.open &= leaf.having(simd, x.simd_ge(from).to_bitmask());
+            self.open &= leaf.having(simd, x.simd_le(to).to_bitmask());
         }
         if best.held != Best::NONE {
-            let level = above - little;
-            let level = both(over_low.simd_ge(level), over_high.simd_ge(level));
+            let level = plane.simd_ge(above - little).to_bitmask();
             self.open = leaf.beside(simd, self.open, level, best);
         }
-        let Spots { height, d, w } = low;
-        for (spots, half) in self.spots.iter_mut().zip([height, d, w]) {
-            spots[..LANES].copy_from_slice(&*half);
-        }
-        let Spots { height, d, w } = high;
-        for (spots, half) in self.spots.iter_mut().zip([height, d, w]) {
-            spots[LANES..].copy_from_slice(&*half);
-        }
+        self.spots = [*under.height, *under.d, *under.w];
     }
 
     /// A height from the base on, in single precision not above it.
@@ -99,40 +89,20 @@ impl Sight {
     /// Bounds the open facets, and closes those that are lower than `best`.
     #[inline(always)]
     pub fn bound<S: Set>(&mut self, simd: S, leaf: &FacetLeaf, best: &Best) {
-        let above = self.above_base(best.height);
-        let mut left = self.open;
-        while left != 0 {
-            // Eight at a time; where less are left, one of them again.
-            let mut slots = [left.trailing_zeros() as usize; LANES];
-            for (slot, next) in slots.iter_mut().zip(lanes(left)) {
-                *slot = next;
-                left &= left - 1;
-            }
-            let mut corners = [[[0.0; LANES]; 3]; 3];
-            for (lane, &slot) in slots.iter().enumerate() {
-                for (corner, vertex) in corners.iter_mut().zip(leaf.corners[slot]) {
-                    for (corner, spots) in corner.iter_mut().zip(&self.spots) {
-                        corner[lane] = spots[usize::from(vertex) % VERTICES];
-                    }
-                }
-            }
-            let bounds = simd.piece(
-                #[inline(always)]
-                || {
-                    let spots = [
-                        spots(simd, &corners[0]),
-                        spots(simd, &corners[1]),
-                        spots(simd, &corners[2]),
-                    ];
-                    self.near.summits(simd, &spots)
-                },
-            );
-            let lower = !bounds.simd_ge(above).to_bitmask();
-            for (lane, &slot) in slots.iter().enumerate() {
-                self.bounds[slot] = bounds[lane];
-                self.open &= !((lower >> lane & 1) << slot);
-            }
-        }
+        let bounds = simd.piece(
+            #[inline(always)]
+            || {
+                let vertices = sixteen(simd, &self.spots);
+                let corners = [
+                    at_corners(simd, leaf, 0, vertices),
+                    at_corners(simd, leaf, 1, vertices),
+                    at_corners(simd, leaf, 2, vertices),
+                ];
+                self.near.summits(simd, &corners)
+            },
+        );
+        self.open &= bounds.simd_ge(self.above_base(best.height)).to_bitmask();
+        self.bounds = *bounds;
     }
 
     /// The most promising of the open facets, if it may be as high as `best`.
@@ -150,11 +120,17 @@ impl Sight {
     }
 }
 
+/// The first, second or third corner of each facet under the dome, given the vertices.
 #[inline(always)]
-fn spots<S: Simd>(simd: S, [height, d, w]: &[[f32; LANES]; 3]) -> Spots<S> {
+fn at_corners<S: Set>(
+    simd: S,
+    leaf: &FacetLeaf,
+    which: usize,
+    [height, d, w]: [f32x16<S>; 3],
+) -> Spots<S> {
     Spots {
-        height: f32x8::from_slice(simd, height),
-        d: f32x8::from_slice(simd, d),
-        w: f32x8::from_slice(simd, w),
+        height: leaf.at_corners(simd, which, height),
+        d: leaf.at_corners(simd, which, d),
+        w: leaf.at_corners(simd, which, w),
     }
 }
