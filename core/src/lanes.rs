@@ -4,7 +4,7 @@
 //! are the same bits. Nothing is multiplied and added in one step, and nothing depends on the other
 //! lanes.
 
-use fearless_simd::{Simd, f32x8, f64x8, mask64x8, prelude::*};
+use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
 
 use crate::contact::Pose;
 use crate::cutter::Cutter;
@@ -45,30 +45,6 @@ fn radii<S: Simd>(simd: S, cutter: &Cutter, d: f64x8<S>) -> (f64x8<S>, mask64x8<
             slope,
             ..
         } => (d * slope + radius, d.abs().simd_le(width / 2.0)),
-    }
-}
-
-/// About m(d), well within the width, a root, and the slope of m times that root.
-#[inline(always)]
-pub(crate) fn slopes<S: Simd>(
-    simd: S,
-    cutter: &Cutter,
-    d: f32x8<S>,
-) -> (f32x8<S>, f32x8<S>, f32x8<S>) {
-    match *cutter {
-        Cutter::Torus {
-            major_radius,
-            minor_radius,
-        } => {
-            let r = f32x8::splat(simd, minor_radius as f32);
-            let root = ((r - d) * (r + d)).sqrt();
-            (root + major_radius as f32, root, -d)
-        }
-        Cutter::Cone { radius, slope, .. } => {
-            let slope = slope as f32;
-            let m = d * slope + radius as f32;
-            (m, f32x8::splat(simd, 1.0), f32x8::splat(simd, slope))
-        }
     }
 }
 

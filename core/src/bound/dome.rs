@@ -262,15 +262,20 @@ mod tests {
         corners: &[[[f32; 16]; 3]; 3],
         edge: [f32; 2],
     ) -> [[f32; 16]; 3] {
-        let [(a, over_a), (b, over_b), (c, over_c)] = [
-            near.over(simd, sixteen(simd, &corners[0])),
-            near.over(simd, sixteen(simd, &corners[1])),
-            near.over(simd, sixteen(simd, &corners[2])),
-        ];
-        let highest = a.height.max(b.height).max(c.height);
-        let sagged = highest + near.sag(edge);
-        let plane = over_a.max(over_b).max(over_c);
-        [*near.summits(simd, &[a, b, c]), *sagged, *plane]
+        simd.piece(
+            #[inline(always)]
+            || {
+                let [(a, over_a), (b, over_b), (c, over_c)] = [
+                    near.over(simd, sixteen(simd, &corners[0])),
+                    near.over(simd, sixteen(simd, &corners[1])),
+                    near.over(simd, sixteen(simd, &corners[2])),
+                ];
+                let highest = a.height.max(b.height).max(c.height);
+                let sagged = highest + near.sag(edge);
+                let plane = over_a.max(over_b).max(over_c);
+                [*near.summits(simd, &[a, b, c]), *sagged, *plane]
+            },
+        )
     }
 
     /// Where a wheel is level, small facets are bounded to a few nanometres: over their inside, an edge and a corner.

@@ -3,7 +3,6 @@
 use fearless_simd::{Simd, f32x8, prelude::*};
 
 use crate::cutter::Cutter;
-use crate::lanes::slopes;
 use crate::tolerance::WELL_WITHIN;
 
 /// Tangent planes of G(d, z) = √(m(d)² − z²), at eight places well within the reach.
@@ -41,5 +40,25 @@ impl<S: Simd> Slopes<S> {
     #[inline(always)]
     pub fn steep(&self) -> f32x8<S> {
         self.by_d.abs() + self.by_z.abs() + 1.0
+    }
+}
+
+/// About m(d), well within the width, a root, and the slope of m times that root.
+#[inline(always)]
+fn slopes<S: Simd>(simd: S, cutter: &Cutter, d: f32x8<S>) -> (f32x8<S>, f32x8<S>, f32x8<S>) {
+    match *cutter {
+        Cutter::Torus {
+            major_radius,
+            minor_radius,
+        } => {
+            let r = f32x8::splat(simd, minor_radius as f32);
+            let root = ((r - d) * (r + d)).sqrt();
+            (root + major_radius as f32, root, -d)
+        }
+        Cutter::Cone { radius, slope, .. } => {
+            let slope = slope as f32;
+            let m = d * slope + radius as f32;
+            (m, f32x8::splat(simd, 1.0), f32x8::splat(simd, slope))
+        }
     }
 }
