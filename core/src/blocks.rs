@@ -256,9 +256,10 @@ pub(crate) fn point_vertices(rows: &[Row], block: &Block, take: &mut dyn FnMut(&
 
 /// The leaf of a block of points.
 pub(crate) fn point_leaf(rows: &[Row], block: &Block) -> PointLeaf {
-    let mut leaf = PointLeaf::EMPTY;
+    let (mut leaf, mut count) = (PointLeaf::EMPTY, 0);
     each_point(rows, block, |row, i| {
-        leaf.push(row.candidate(i), row.points[i]);
+        leaf.set(count, row.candidate(i), row.points[i]);
+        count += 1;
     });
     leaf
 }

@@ -30,7 +30,8 @@ pub(crate) struct FacetLeaf {
     masks: [u32; FACETS],
     /// The vertices as places among all points, whose coordinates are what is solved exactly.
     pub places: [u32; VERTICES],
-    /// The first, second and third corner of each facet: the four bytes of a vertex of sixteen.
+    /// The first, second and third corner of each facet, each the places of a vertex's four bytes among those of
+    /// all: by these one permutation picks the corners of all facets.
     corners: [[[u8; 4]; FACETS]; 3],
     numbers: [u64; FACETS],
 }
@@ -164,7 +165,7 @@ impl FacetLeaf {
     }
 }
 
-/// The bytes of a number among sixteen.
+/// The places of a vertex's four bytes among those of all vertices.
 fn bytes(slot: u8) -> [u8; 4] {
     [0, 1, 2, 3].map(|byte| 4 * slot + byte)
 }

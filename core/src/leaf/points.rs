@@ -19,7 +19,6 @@ pub(crate) const POINTS: usize = 2 * LANES;
 pub(crate) struct PointLeaf {
     at: [[f64; POINTS]; 3],
     ids: [u64; POINTS],
-    count: usize,
 }
 
 impl PointLeaf {
@@ -27,16 +26,23 @@ impl PointLeaf {
     pub const EMPTY: Self = Self {
         at: [[f64::INFINITY; POINTS], [0.0; POINTS], [0.0; POINTS]],
         ids: [u64::MAX; POINTS],
-        count: 0,
     };
 
-    /// Adds a point to less than [`POINTS`] others.
-    pub fn push(&mut self, id: u64, point: Point) {
+    /// Puts a point into a free slot.
+    pub fn set(&mut self, slot: usize, id: u64, point: Point) {
         for (axis, coordinate) in self.at.iter_mut().zip(point) {
-            axis[self.count] = coordinate;
+            axis[slot] = coordinate;
         }
-        self.ids[self.count] = id;
-        self.count += 1;
+        self.ids[slot] = id;
+    }
+
+    /// How many points there are: told by what is read of it anyway.
+    #[inline(always)]
+    fn count<S: Simd>(&self, simd: S) -> u32 {
+        let low = f64x8::from_slice(simd, &self.at[0][..LANES]);
+        let high = f64x8::from_slice(simd, &self.at[0][LANES..]);
+        let there = low.simd_lt(f64::INFINITY).to_bitmask();
+        there.count_ones() + high.simd_lt(f64::INFINITY).to_bitmask().count_ones()
     }
 
     /// Heights of eight of its points.
@@ -97,7 +103,7 @@ impl Leaf for PointLeaf {
                 }
             }
         }
-        let evaluated = self.count * alive.count_ones() as usize;
-        (evaluated as u64, raised)
+        let evaluated = self.count(simd) * alive.count_ones();
+        (u64::from(evaluated), raised)
     }
 }
