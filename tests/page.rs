@@ -1,7 +1,5 @@
 //! The master's page in a real browser, during a real job. Where there is none this is skipped by name.
 
-use std::path::Path;
-
 use crate::common::browser::Browser;
 use crate::common::{Process, get, http, master, sample, scratch, submit, worker};
 use serde_json::{Value, json};
@@ -116,20 +114,9 @@ fn the_page_shows_a_job_from_its_begin_to_its_end() {
     browser.wait("document.querySelector('#link').textContent === 'live'");
 }
 
-/// At every width, light and dark: nothing wider than the screen, and everything to be operated has a
-/// name. Pictures of it are left in the target folder.
+/// Nothing is wider than the screen, and everything to be operated has a name.
 fn check_looks(browser: &Browser, when: &str) {
-    for (width, height) in [(1280, 800), (390, 844)] {
-        for scheme in ["light", "dark"] {
-            browser.screen(width, height, scheme);
-            let wide = browser.ask("return document.documentElement.scrollWidth");
-            assert_eq!(wide, json!(width), "{when}, {scheme}");
-            let file = format!("page-{when}-{width}-{scheme}.png");
-            let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(file);
-            std::fs::write(file, browser.picture()).expect("writable");
-        }
-    }
-    browser.screen(1280, 800, "light");
+    browser.check_widths(&format!("page-{when}"));
     let nameless =
         "return [...document.querySelectorAll('button, progress, section, article, ol, a')]
         .filter((e) => !(e.ariaLabel || e.textContent.trim() || e.getAttribute('aria-labelledby')))

@@ -1,6 +1,7 @@
 //! A run's page in a real browser, from disk. Where there is none this is skipped by name.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use crate::common::browser::Browser;
 use crate::common::{job, lower, sample, scratch, succeed, text};
@@ -25,9 +26,11 @@ const LOOK: &str = "
             gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
             let [covered, red, sum] = [0, 0, 0];
             for (let i = 0; i < pixels.length; i += 4) {
-                const [r, g, b, a] = pixels.subarray(i, i + 4);
-                if (a > 0) covered++;
-                if (a > 0 && r > g + 70 && r > b + 70) red++;
+                const r = pixels[i], g = pixels[i + 1], b = pixels[i + 2];
+                if (pixels[i + 3] > 0) {
+                    covered++;
+                    if (r > g + 70 && r > b + 70) red++;
+                }
                 sum = (sum * 31 + r + 256 * g + 65536 * b) % 1000003;
             }
             resolve({ covered: covered / (width * height), red, sum });
@@ -53,6 +56,13 @@ fn page(dir: &Path, job: &Path) -> PathBuf {
     out.join("report.html")
 }
 
+/// The page of the sample's run, which is the same for all tests that look at it.
+fn page_of_the_sample() -> &'static Path {
+    static PAGE: OnceLock<PathBuf> = OnceLock::new();
+    let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join("view");
+    PAGE.get_or_init(|| page(&dir, &sample()))
+}
+
 fn open(browser: &Browser, page: &Path) {
     browser.screen(1280, 900, "light");
     browser.open(&format!("file://{}", text(page)));
@@ -69,8 +79,7 @@ fn a_page_from_disk_shows_its_run() {
     let Some(browser) = Browser::start(&WITH_WEBGL) else {
         return;
     };
-    let dir = scratch();
-    open(&browser, &page(dir.path(), &sample()));
+    open(&browser, page_of_the_sample());
 
     let first = browser.ask("return picture()");
     let covered = number(&first["covered"]);
@@ -214,7 +223,7 @@ fn what_one_position_too_low_leaves_is_seen_on_the_map() {
         return;
     };
     let dir = scratch();
-    let good = page(dir.path(), &sample());
+    let good = page_of_the_sample();
     let path = good.with_file_name("path.csv");
     let lowered = dir.path().join("low.csv");
     let [x, angle] = lower(&path, &lowered);
@@ -232,7 +241,7 @@ fn what_one_position_too_low_leaves_is_seen_on_the_map() {
         let picture = browser.ask("choose('#colour', 'machined'); return picture()");
         (browser.ask(RED_ON_MAP), number(&picture["red"]))
     };
-    let (map, before) = look(&good);
+    let (map, before) = look(good);
     assert_eq!(map[0], 0, "nothing is gouged: {map}");
     let (map, red) = look(&out.join("report.html"));
     assert!(red > before + 200.0, "no ring: {red}, {before} before");
@@ -313,8 +322,7 @@ fn fingers_turn_and_zoom_and_play_goes_along_the_path() {
     let Some(browser) = Browser::start(&WITH_WEBGL) else {
         return;
     };
-    let dir = scratch();
-    open(&browser, &page(dir.path(), &sample()));
+    open(&browser, page_of_the_sample());
     browser.screen(390, 844, "light");
     browser.ask("document.querySelector('#show-wheel').click(); document.querySelector('#solid').scrollIntoView()");
     let at = browser.ask(
@@ -375,8 +383,7 @@ fn without_webgl_the_plots_and_figures_are_there() {
     let Some(browser) = Browser::start(&["--disable-3d-apis"]) else {
         return;
     };
-    let dir = scratch();
-    open(&browser, &page(dir.path(), &sample()));
+    open(&browser, page_of_the_sample());
     let told = browser.ask("return document.querySelector('#no-webgl').checkVisibility()");
     assert_eq!(told, true);
     let drawn = "const drawn = (id) => {
@@ -423,20 +430,9 @@ fn pictures_for_the_documentation() {
     }
 }
 
-/// At every width, light and dark: nothing wider than the screen, and everything to be operated has a
-/// name. Pictures of it are left in the target folder.
+/// Nothing is wider than the screen, and everything to be operated has a name.
 fn check_looks(browser: &Browser, what: &str) {
-    for (width, height) in [(1280, 900), (390, 844)] {
-        for scheme in ["light", "dark"] {
-            browser.screen(width, height, scheme);
-            let wide = browser.ask("return document.documentElement.scrollWidth");
-            assert_eq!(wide, json!(width), "{what}, {scheme}");
-            let file = format!("view-{what}-{width}-{scheme}.png");
-            let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(file);
-            std::fs::write(file, browser.picture()).expect("writable");
-        }
-    }
-    browser.screen(1280, 900, "light");
+    browser.check_widths(&format!("view-{what}"));
     let nameless = "return [...document.querySelectorAll('button, input, select, section, table, canvas, a, [role]')]
         .filter((e) => e.checkVisibility() && !(e.ariaLabel || e.ariaHidden || e.textContent.trim() || e.labels?.length
             || e.getAttribute('aria-labelledby')))

@@ -10,22 +10,21 @@
 mod dome;
 mod lid;
 
-use fearless_simd::{Simd, f32x8, prelude::*};
+use fearless_simd::{Simd, SimdBase};
 
-use crate::lanes::LANES;
-
-pub(crate) use dome::{Dome, NearDome, Spots, sixteen};
+pub(crate) use dome::{Dome, NearDome, Spots};
 pub(crate) use lid::{Frame, Lids, Swing, View, lid_bounds};
 
-/// Eight points or vectors.
-type Eight<S> = [f32x8<S>; 3];
-
+/// Points or other triples, one in each lane.
 #[inline(always)]
-pub(crate) fn load<S: Simd>(simd: S, axes: &[[f32; LANES]; 3]) -> Eight<S> {
+pub(crate) fn load<S: Simd, V: SimdBase<S, Element = f32>, const N: usize>(
+    simd: S,
+    axes: &[[f32; N]; 3],
+) -> [V; 3] {
     [
-        f32x8::from_slice(simd, &axes[0]),
-        f32x8::from_slice(simd, &axes[1]),
-        f32x8::from_slice(simd, &axes[2]),
+        V::from_slice(simd, &axes[0]),
+        V::from_slice(simd, &axes[1]),
+        V::from_slice(simd, &axes[2]),
     ]
 }
 

@@ -4,6 +4,7 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
@@ -118,8 +119,27 @@ impl Browser {
         self.tell("Emulation.setEmulatedMedia", &media);
     }
 
+    /// At every width, light and dark: nothing is wider than the screen. With `HORMA_PICTURES` set, pictures of all of
+    /// it are left in the target folder, to be looked at: they take longer than all else.
+    pub fn check_widths(&self, what: &str) {
+        let pictures = std::env::var_os("HORMA_PICTURES").is_some();
+        for (width, height) in [(1280, 900), (390, 844)] {
+            for scheme in ["light", "dark"] {
+                self.screen(width, height, scheme);
+                let wide = self.ask("return document.documentElement.scrollWidth");
+                assert_eq!(wide, json!(width), "{what}, {scheme}");
+                if pictures {
+                    let file = format!("{what}-{width}-{scheme}.png");
+                    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(file);
+                    std::fs::write(file, self.picture()).expect("writable");
+                }
+            }
+        }
+        self.screen(1280, 900, "light");
+    }
+
     /// A picture of all of the page, as PNG.
-    pub fn picture(&self) -> Vec<u8> {
+    fn picture(&self) -> Vec<u8> {
         self.capture(&json!({"format": "png", "captureBeyondViewport": true}))
     }
 

@@ -139,16 +139,6 @@ pub(crate) struct NearDome {
     bends: [f32; 2],
 }
 
-/// Sixteen points.
-#[inline(always)]
-pub(crate) fn sixteen<S: Simd>(simd: S, axes: &[[f32; 16]; 3]) -> [f32x16<S>; 3] {
-    [
-        f32x16::from_slice(simd, &axes[0]),
-        f32x16::from_slice(simd, &axes[1]),
-        f32x16::from_slice(simd, &axes[2]),
-    ]
-}
-
 /// Sixteen points under a dome: how high it is over each, and their δ and w.
 pub(crate) struct Spots<S: Simd> {
     pub height: f32x16<S>,
@@ -247,6 +237,7 @@ fn crest<S: Simd>(a: f32x16<S>, b: f32x16<S>, bend: f32x16<S>) -> f32x16<S> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::load;
     use super::super::tests::{cutter, pose};
     use super::*;
     use crate::contact::touch_facet;
@@ -266,9 +257,9 @@ mod tests {
             #[inline(always)]
             || {
                 let [(a, over_a), (b, over_b), (c, over_c)] = [
-                    near.over(simd, sixteen(simd, &corners[0])),
-                    near.over(simd, sixteen(simd, &corners[1])),
-                    near.over(simd, sixteen(simd, &corners[2])),
+                    near.over(simd, load(simd, &corners[0])),
+                    near.over(simd, load(simd, &corners[1])),
+                    near.over(simd, load(simd, &corners[2])),
                 ];
                 let highest = a.height.max(b.height).max(c.height);
                 let sagged = highest + near.sag(edge);

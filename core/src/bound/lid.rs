@@ -5,7 +5,7 @@ mod slopes;
 mod under;
 mod view;
 
-use fearless_simd::{Simd, f64x8, prelude::*};
+use fearless_simd::{Simd, f32x8, f64x8, prelude::*};
 
 use self::fit::{Shape, few};
 use crate::lanes::LANES;
@@ -14,6 +14,9 @@ use crate::vector::{Interval, Point, add_scaled, length};
 
 pub(crate) use under::lid_bounds;
 pub(crate) use view::{Swing, View};
+
+/// Eight points or vectors.
+type Eight<S> = [f32x8<S>; 3];
 
 /// Where the lids of a tree are: what rounding has to be measured by.
 #[derive(Debug, Clone, Copy)]

@@ -4,7 +4,7 @@ use fearless_simd::{Simd, f32x16, prelude::*, u8x64, u32x16};
 
 use super::sight::Sight;
 use super::{Batch, Best, Leaf, margin};
-use crate::bound::{Dome, sixteen};
+use crate::bound::{Dome, Spots, load};
 use crate::contact::{Pose, Spot, height_well_within, touch_seen};
 use crate::cutter::Cutter;
 use crate::lanes::{LANES, Lanes, lanes};
@@ -76,13 +76,18 @@ impl FacetLeaf {
     /// The vertices.
     #[inline(always)]
     pub fn vertices<S: Simd>(&self, simd: S) -> [f32x16<S>; 3] {
-        sixteen(simd, &self.near)
+        load(simd, &self.near)
     }
 
-    /// What there is of the first, second or third corner of each facet, given that of each vertex.
+    /// The first, second or third corner of each facet under a dome, given the vertices.
     #[inline(always)]
-    pub fn at_corners<S: Simd>(&self, simd: S, which: usize, vertices: f32x16<S>) -> f32x16<S> {
-        vertices.swizzle_dyn(u8x64::from_slice(simd, self.corners[which].as_flattened()))
+    pub fn at_corners<S: Simd>(&self, simd: S, which: usize, vertices: &Spots<S>) -> Spots<S> {
+        let places = u8x64::from_slice(simd, self.corners[which].as_flattened());
+        Spots {
+            height: vertices.height.swizzle_dyn(places),
+            d: vertices.d.swizzle_dyn(places),
+            w: vertices.w.swizzle_dyn(places),
+        }
     }
 
     /// The facets that have any of some vertices.

@@ -1,10 +1,10 @@
 //! What a position sees of a leaf of facets: which of them may be higher than the highest it has found.
 
-use fearless_simd::{f32x16, prelude::*};
+use fearless_simd::prelude::*;
 
 use super::facets::{FACETS, FacetLeaf, VERTICES};
 use super::{Best, margin};
-use crate::bound::{Dome, NearDome, Spots, sixteen};
+use crate::bound::{Dome, NearDome, Spots, load};
 use crate::contact::{Pose, least_height};
 use crate::cutter::Cutter;
 use crate::lanes::{Lanes, lanes};
@@ -92,11 +92,12 @@ impl Sight {
         let bounds = simd.piece(
             #[inline(always)]
             || {
-                let vertices = sixteen(simd, &self.spots);
+                let [height, d, w] = load(simd, &self.spots);
+                let vertices = Spots { height, d, w };
                 let corners = [
-                    at_corners(simd, leaf, 0, vertices),
-                    at_corners(simd, leaf, 1, vertices),
-                    at_corners(simd, leaf, 2, vertices),
+                    leaf.at_corners(simd, 0, &vertices),
+                    leaf.at_corners(simd, 1, &vertices),
+                    leaf.at_corners(simd, 2, &vertices),
                 ];
                 self.near.summits(simd, &corners)
             },
@@ -117,20 +118,5 @@ impl Sight {
         highest
             .1
             .filter(|_| highest.0 >= self.above_base(best.height))
-    }
-}
-
-/// The first, second or third corner of each facet under the dome, given the vertices.
-#[inline(always)]
-fn at_corners<S: Set>(
-    simd: S,
-    leaf: &FacetLeaf,
-    which: usize,
-    [height, d, w]: [f32x16<S>; 3],
-) -> Spots<S> {
-    Spots {
-        height: leaf.at_corners(simd, which, height),
-        d: leaf.at_corners(simd, which, d),
-        w: leaf.at_corners(simd, which, w),
     }
 }

@@ -3,8 +3,8 @@
 use fearless_simd::{Simd, f32x8, mask32x8, prelude::*};
 
 use super::slopes::Slopes;
-use super::{Lids, Swing, View};
-use crate::bound::{Eight, load};
+use super::{Eight, Lids, Swing, View};
+use crate::bound::load;
 use crate::cutter::Cutter;
 use crate::lanes::{LANES, Lanes, lanes};
 use crate::simd::Set;
@@ -61,7 +61,7 @@ impl<S: Simd> Under<S> {
     #[inline(always)]
     fn new(simd: S, cutter: &Cutter, view: &View, swing: Swing, lids: &Lids) -> Self {
         let [d, y, z] = view.see(simd, lids);
-        let u = load(simd, &lids.u);
+        let u: Eight<S> = load(simd, &lids.u);
         let vy = f32x8::from_slice(simd, &lids.v[0]);
         let vz = f32x8::from_slice(simd, &lids.v[1]);
         let below = f32x8::from_slice(simd, &lids.below);
@@ -119,10 +119,10 @@ impl<S: Simd> Slopes<S> {
     /// along u by twice `bend`.
     #[inline(always)]
     fn rise_over(&self, simd: S, view: &View, lids: &Lids, bend: f32x8<S>) -> f32x8<S> {
-        let u = load(simd, &lids.u);
+        let u: Eight<S> = load(simd, &lids.u);
         let vy = f32x8::from_slice(simd, &lids.v[0]);
         let vz = f32x8::from_slice(simd, &lids.v[1]);
-        let normal = load(simd, &lids.normal);
+        let normal: Eight<S> = load(simd, &lids.normal);
         let above = f32x8::from_slice(simd, &lids.above);
         let below = f32x8::from_slice(simd, &lids.below);
         // Turned back into the part's frame, the plane's slopes tell how far it rises under a lid.

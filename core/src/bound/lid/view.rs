@@ -2,8 +2,8 @@
 
 use fearless_simd::{Simd, prelude::*};
 
-use super::{Frame, Lids};
-use crate::bound::{Eight, load};
+use super::{Eight, Frame, Lids};
+use crate::bound::load;
 use crate::contact::Pose;
 use crate::cutter::Cutter;
 
@@ -38,7 +38,7 @@ impl View {
     /// The middles of lids, seen from the cutter.
     #[inline(always)]
     pub(super) fn see<S: Simd>(&self, simd: S, lids: &Lids) -> Eight<S> {
-        let [x, y, z] = load(simd, &lids.middle);
+        let [x, y, z]: Eight<S> = load(simd, &lids.middle);
         [
             x - self.x,
             y.mul_add(self.cos, z * -self.sin),
