@@ -528,11 +528,10 @@ fn positions_are_inserted_where_straight_moves_would_gouge() {
 
     // By flag or file, and by any search, it is the same.
     let flag = ["--path-tolerance", "0.02"];
-    let unverified = [&flag[..], &["--no-verify"]].concat();
-    assert!(results(&coarse, "flag", &unverified).1 == csv);
+    assert!(results(&coarse, "flag", &flag).1 == csv);
     let [exact, brute] = ["exact", "brute"].map(|method| {
         // Brute force takes its time over all facets.
-        let rough = ["--tolerance", "0.1", "--method", method, "--no-verify"];
+        let rough = ["--tolerance", "0.1", "--method", method];
         results(&finer, method, &rough).1
     });
     assert!(exact == brute);

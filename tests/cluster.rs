@@ -247,14 +247,7 @@ fn a_mesh_has_no_surfaces_to_send() {
 #[test]
 fn what_is_inserted_is_the_same_on_any_number_of_workers() {
     let (dir, sample_job) = (scratch(), sample());
-    let base = [
-        "--step",
-        "4",
-        "--points-per-revolution",
-        "72",
-        "--path-tolerance",
-        "0.005",
-    ];
+    let base = ["--path-tolerance", "0.005", "--points-per-revolution", "72"];
     for more in [&[][..], &["--contact", "point"]] {
         let given = [&base[..], more].concat();
         let alone = path_of(&sample(), dir.path(), "alone", &given);
