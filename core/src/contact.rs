@@ -149,14 +149,16 @@ fn weights_of_support(cutter: &Cutter, [a, b, c]: [Point; 3]) -> Option<[f64; 3]
     let n = cross(ab, ac);
     // An upright facet is touched along its edges alone; with a tilt below this the weights would
     // be noise.
-    if n[1].abs() <= UPRIGHT * length(n) {
+    let size = length(n);
+    if n[1].abs() <= UPRIGHT * size {
         return None;
     }
-    let up = if n[1] > 0.0 { n } else { [-n[0], -n[1], -n[2]] };
-    let (d, z) = support(cutter, up);
+    let up = 1.0_f64.copysign(n[1]);
+    let (d, z) = support(cutter, n.map(|c| up * c), size);
     let (d, z) = (d - a[0], z - a[2]);
-    let s = (z * ac[0] - d * ac[2]) / n[1];
-    let t = (d * ab[2] - z * ab[0]) / n[1];
+    let share = 1.0 / n[1];
+    let s = (z * ac[0] - d * ac[2]) * share;
+    let t = (d * ab[2] - z * ab[0]) * share;
     Some([1.0 - s - t, s, t])
 }
 
@@ -164,9 +166,9 @@ fn weights_of_support(cutter: &Cutter, [a, b, c]: [Point; 3]) -> Option<[f64; 3]
 const UPRIGHT: f64 = 1.0e-6;
 
 /// `(d, z)` of the point where the cutter, coming down, first meets a plane whose normal is `n`,
-/// `n[1] > 0`.
+/// `n[1] > 0`, of length `size`.
 #[inline(always)]
-fn support(cutter: &Cutter, n: Point) -> (f64, f64) {
+fn support(cutter: &Cutter, n: Point, size: f64) -> (f64, f64) {
     let rho = (n[1] * n[1] + n[2] * n[2]).sqrt();
     match *cutter {
         // A disc of radius R swept by a ball of radius r: the two supports add up.
@@ -174,7 +176,7 @@ fn support(cutter: &Cutter, n: Point) -> (f64, f64) {
             major_radius,
             minor_radius,
         } => {
-            let share = minor_radius / length(n);
+            let share = minor_radius / size;
             (-share * n[0], -(share + major_radius / rho) * n[2])
         }
         // One of the two rims, or both and the line between them.

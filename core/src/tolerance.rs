@@ -12,10 +12,10 @@ pub const BOUND_SLACK: f64 = 1.0e-12;
 /// within reach of a contact must not be left out. Far above the rounding of any coordinate.
 pub const REACH_SLACK: f64 = 1.0e-9;
 
-/// A line search along a facet's edge stops once it is this close, as a fraction of the edge's part
-/// within reach. Near a maximum inside that part the height is flat, so that its own error is of the
-/// order of this number's square.
-pub const EDGE_SEARCH: f64 = 1.0e-9;
+/// A line search along a facet's edge is over once a step of it is this small, as a fraction of the edge's part
+/// within reach. The next step would be smaller by orders, and near a maximum the height is flat, so that its own
+/// error is of the order of that next step's square.
+pub const EDGE_SEARCH: f64 = 1.0e-5;
 
 /// How far out tangent planes are taken, as a fraction of the reach: at its end their slopes are
 /// infinite.

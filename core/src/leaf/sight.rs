@@ -45,21 +45,22 @@ impl Sight {
         self.near = self.dome.near(pose, leaf.middle, leaf.size, self.base);
         let (under, plane) = self.near.over(simd, leaf.vertices(simd));
         let sag = self.near.sag(leaf.edge);
-        let top = under.height.reduce_max();
-        if top < -sag {
+        let mut above = self.above_base(best.height);
+        if under.height.simd_ge(above - sag).to_bitmask() == 0 {
             return;
         }
         let little = margin(cutter, pose, self.base) as f32;
-        if let Some(points) = points.filter(|_| top > little) {
+        let higher = under.height.simd_gt(little).to_bitmask();
+        if let Some(points) = points.filter(|_| higher != 0) {
             // The facets at a vertex are no lower than it is.
-            let tops = under.height.simd_ge(top).to_bitmask();
+            let tops = under.height.simd_ge(under.height.reduce_max()).to_bitmask();
             let vertex = leaf.places[tops.trailing_zeros() as usize % VERTICES];
             let floor = least_height(cutter, pose, points[vertex as usize]);
             if floor > best.height {
                 *best = Best::above(floor);
+                above = self.above_base(floor);
             }
         }
-        let above = self.above_base(best.height);
         let higher = under.height.simd_ge(above - sag).to_bitmask();
         let over = plane.simd_ge(above).to_bitmask();
         self.open = leaf.having(simd, higher) & leaf.having(simd, over);
