@@ -14,7 +14,7 @@ use horma_core::Simd;
 use horma_formats::part::{UNIT_NAMES, Unit};
 use horma_papers::Experiment;
 
-pub(crate) use self::bench::{Bench, BenchKernel, BenchScaling, Search};
+pub(crate) use self::bench::{Bench, BenchKernel, BenchMotion, BenchScaling, Search};
 pub(crate) use self::job::{Also, How, Job};
 pub(crate) use self::last::{Made, Measure, Sizes};
 pub(crate) use self::serve::{Joining, Master, Worker};

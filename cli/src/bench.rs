@@ -40,7 +40,7 @@ pub(crate) fn kernel(args: &BenchKernel) -> Result<()> {
 }
 
 fn measure_and_write(args: &BenchKernel, display: &Display) -> Result<String> {
-    let subject = subject(args.job.as_deref(), display)?;
+    let subject = subject(args, display)?;
     output::prepare_dir_of(&args.output, output::of_bench)?;
     let effort = if args.quick {
         Effort::QUICK
@@ -68,8 +68,8 @@ fn measure_and_write(args: &BenchKernel, display: &Display) -> Result<String> {
 }
 
 /// The part, the cutter and the motion of a job, or of the sample.
-fn subject(job: Option<&Path>, display: &Display) -> Result<Subject> {
-    let (file, name, part) = read(job, &Overrides::default(), display)?;
+fn subject(args: &BenchKernel, display: &Display) -> Result<Subject> {
+    let (file, name, part) = read(args.job.as_deref(), &args.motion.overrides(), display)?;
     Ok(Subject {
         name,
         part,

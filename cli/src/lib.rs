@@ -86,6 +86,7 @@ pub fn bench_kernel(output: &Path) -> ExitCode {
         job: None,
         output: output.to_owned(),
         quick: true,
+        motion: args::BenchMotion::default(),
         quiet: false,
     }))
 }

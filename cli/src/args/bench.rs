@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use horma_core::Distribution;
+use horma_formats::job::Overrides;
 
 use super::one_of;
 
@@ -21,9 +22,11 @@ pub(crate) enum Bench {
 Examples:
   horma bench kernel -o bench --quick     the sample last, in a few seconds
   horma bench kernel job.toml -o bench    your part, cutter and motion
+  horma bench kernel job.toml -o bench --step 0.25 --points-per-revolution 3600
 
 Of a job, its part, cutter and motion are taken; the grid, the contact and the method are what is
-varied.")]
+varied. Positions that are close to each other share most of their search, so that a position of a finer
+path costs less, the more so the denser the grid is.")]
     Kernel(BenchKernel),
     /// Measure clusters of this machine's processes against one process: speed-up, bytes, the papers' model
     ///
@@ -54,9 +57,33 @@ pub(crate) struct BenchKernel {
     /// Up to a hundred thousand points only, and fewer repetitions
     #[arg(long)]
     pub quick: bool,
+    #[command(flatten)]
+    pub motion: BenchMotion,
     /// Show no progress, only the table
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// What of the job's motion is varied.
+#[derive(Debug, Default, Args)]
+pub(crate) struct BenchMotion {
+    /// Travel per revolution, mm [default: the job's]
+    #[arg(long, value_name = "MM")]
+    pub step: Option<f64>,
+    /// Positions per revolution [default: the job's]
+    #[arg(long, value_name = "N")]
+    pub points_per_revolution: Option<u32>,
+}
+
+impl BenchMotion {
+    /// The job file with this motion.
+    pub fn overrides(&self) -> Overrides {
+        Overrides {
+            step: self.step,
+            points_per_revolution: self.points_per_revolution,
+            ..Overrides::default()
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -85,12 +112,8 @@ pub(crate) struct BenchScaling {
     /// Chordal tolerance of surfaces, mm [default: the job's]
     #[arg(long, value_name = "MM")]
     pub tolerance: Option<f64>,
-    /// Travel per revolution, mm [default: the job's]
-    #[arg(long, value_name = "MM")]
-    pub step: Option<f64>,
-    /// Positions per revolution [default: the job's]
-    #[arg(long, value_name = "N")]
-    pub points_per_revolution: Option<u32>,
+    #[command(flatten)]
+    pub motion: BenchMotion,
     /// Of the network to project on: what every machine's line carries
     #[arg(long, value_name = "GBIT/S", default_value_t = 10.0, value_parser = positive)]
     pub network_gbit: f64,

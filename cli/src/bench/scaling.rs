@@ -54,9 +54,7 @@ pub(crate) fn scaling(args: &BenchScaling) -> Result<()> {
 fn measure_and_write(args: &BenchScaling, display: &Display) -> Result<String> {
     let overrides = Overrides {
         tolerance: args.tolerance,
-        step: args.step,
-        points_per_revolution: args.points_per_revolution,
-        ..Overrides::default()
+        ..args.motion.overrides()
     };
     let (file, name, part) = super::read(args.job.as_deref(), &overrides, display)?;
     output::prepare_dir_of(&args.output, output::of_scaling)?;
