@@ -28,7 +28,7 @@ impl Effort {
         densities: &[
             1.0e4, 1.9e4, 3.16e4, 1.0e5, 3.16e5, 1.0e6, 1.8e6, 3.16e6, 1.0e7,
         ],
-        positions: 100_000,
+        positions: 300_000,
         turns: 3,
         patience: Duration::from_millis(1000),
         brute: Duration::from_millis(150),
@@ -157,7 +157,8 @@ fn runs(trajectory: &Trajectory, most: u64) -> Vec<Range<u64>> {
     if total <= most.max(count * length) {
         return std::iter::once(0..total).collect();
     }
-    let start = |k| (total - length) / (count - 1) * k;
+    // In the middle of equal shares: a part's ends, where most of it is out of reach, count no more than they are.
+    let start = |k| total / count * k + (total / count - length) / 2;
     (0..count).map(|k| start(k)..start(k) + length).collect()
 }
 
@@ -174,7 +175,11 @@ mod tests {
             positions,
         };
         let runs = runs(&trajectory, most);
-        assert_eq!(runs[0].start, 0);
+        let beyond = positions - runs[runs.len() - 1].end;
+        assert!(
+            beyond.abs_diff(runs[0].start) <= runs.len() as u64 + 1,
+            "{runs:?}"
+        );
         assert!(runs.windows(2).all(|w| w[0].end <= w[1].start), "{runs:?}");
         assert!(runs.iter().all(|r| r.end <= positions), "{runs:?}");
         runs
@@ -188,9 +193,14 @@ mod tests {
         }
         let runs = check(10_000_000, 360, 100_000);
         assert_eq!(runs.len(), 97);
-        assert!(runs[96].end > 9_990_000, "{:?}", runs[96]);
+        assert!(runs.iter().all(|r| r.end - r.start == 1024), "{runs:?}");
         let long = check(100_000_000, 1_000_000, 100_000);
-        assert!(long.len() == 3 && long[0].end == 2_000_000, "{long:?}");
+        assert_eq!(long.len(), 3);
+        for (run, share) in long.iter().zip([1_u64, 3, 5]) {
+            assert_eq!(run.end - run.start, 2_000_000);
+            let middle = run.start + 1_000_000;
+            assert!(middle.abs_diff(100_000_000 / 6 * share) < 10, "{long:?}");
+        }
     }
 
     #[test]
