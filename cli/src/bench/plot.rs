@@ -19,8 +19,12 @@ pub(super) fn against_density(figures: &Figures) -> Plot {
     Plot {
         title: "Cost per position against density".to_owned(),
         subtitle: format!(
-            "{}, {}, one thread, {}",
-            figures.part, figures.cutter, figures.simd
+            "{}, {}, step {} mm, {} points a revolution, one thread, {}",
+            figures.part,
+            figures.cutter,
+            figures.step_mm,
+            figures.points_per_revolution,
+            figures.simd
         ),
         x: "points of the part".to_owned(),
         y: "time per position (µs)".to_owned(),
