@@ -25,8 +25,8 @@ Examples:
   horma bench kernel job.toml -o bench --step 0.25 --points-per-revolution 3600
 
 Of a job, its part, cutter and motion are taken; the grid, the contact and the method are what is
-varied. Positions that are close to each other share most of their search, so that a position of a finer
-path costs less, the more so the denser the grid is.")]
+varied. Positions that are close to each other share most of their search: one of a finer path costs
+less, the more so the denser the grid is.")]
     Kernel(BenchKernel),
     /// Measure clusters of this machine's processes against one process: speed-up, bytes, the papers' model
     ///

@@ -155,7 +155,7 @@ fn maximum(
         if here.stays_below(floor, left) {
             return None;
         }
-        let next = between(newest, other, before);
+        let next = interpolated(newest, other, before);
         let settled = here.sign.abs() <= SETTLED * before.1.abs().min(other.1.abs());
         let enough = EDGE_SEARCH * span;
         let last = settled && (next - t).abs() <= enough;
@@ -170,7 +170,7 @@ fn maximum(
 /// Where a slope vanishes between its newest place and the `other` side of the zero, given also the place `before`
 /// on its own side.
 #[inline(always)]
-fn between((a, at_a): (f64, f64), (b, at_b): (f64, f64), (c, at_c): (f64, f64)) -> f64 {
+fn interpolated((a, at_a): (f64, f64), (b, at_b): (f64, f64), (c, at_c): (f64, f64)) -> f64 {
     let (way, whole_way, rest_way) = (a - b, c - b, c - a);
     let (change, whole_change, rest_change) = (at_a - at_b, at_c - at_b, at_c - at_a);
     // The parabola through all three is followed if it is steep enough at both its ends, which is that the

@@ -50,8 +50,8 @@ impl Sight {
             return;
         }
         let little = margin(cutter, pose, self.base) as f32;
-        let higher = under.height.simd_gt(little).to_bitmask();
-        if let Some(points) = points.filter(|_| higher != 0) {
+        let raising = under.height.simd_gt(little).to_bitmask();
+        if let Some(points) = points.filter(|_| raising != 0) {
             // The facets at a vertex are no lower than it is.
             let tops = under.height.simd_ge(under.height.reduce_max()).to_bitmask();
             let vertex = leaf.places[tops.trailing_zeros() as usize % VERTICES];
